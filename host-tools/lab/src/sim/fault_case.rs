@@ -213,7 +213,7 @@ impl fmt::Display for Outcome {
 
 /// The probe's messages so far.
 #[derive(Default)]
-struct Heard {
+struct HostLog {
     named: Vec<Named>,
     /// Time of the first one.
     first_ns: Option<u64>,
@@ -221,7 +221,7 @@ struct Heard {
     troubles: Vec<Failure>,
 }
 
-impl Host for Heard {
+impl Host for HostLog {
     fn tell(&mut self, event: Event) {
         match event {
             Event::TextureLearned(_) => self.learned = true,
@@ -292,7 +292,7 @@ impl<'t> Bench<'t> {
             .calibrate(self.calibration)
             .map_err(SimError::from)?;
         rig.home()?;
-        let (host, plan) = (RefCell::new(Heard::default()), dsp::Plan::new());
+        let (host, plan) = (RefCell::new(HostLog::default()), dsp::Plan::new());
         let mut buffer = vec![0; TABLE];
         let blank = RamFlash::blank();
         let mut probe = switch_on(rig, blank, self.factory, &mut buffer, &plan, &host)?;
@@ -346,12 +346,12 @@ impl<'t> Bench<'t> {
     /// The power is off for a moment, in which bits of the flash change.
     fn restarted<'p>(
         &self,
-        probe: SimProbe<'p, Heard>,
+        probe: SimProbe<'p, HostLog>,
         case: &Case,
-        host: &RefCell<Heard>,
+        host: &RefCell<HostLog>,
         before: &Kept,
         wrong: &mut Vec<String>,
-    ) -> Result<SimProbe<'p, Heard>, StoreError>
+    ) -> Result<SimProbe<'p, HostLog>, StoreError>
     where
         't: 'p,
     {
@@ -378,7 +378,7 @@ struct Kept {
 }
 
 impl Kept {
-    fn of(probe: &mut SimProbe<'_, Heard>) -> Self {
+    fn of(probe: &mut SimProbe<'_, HostLog>) -> Self {
         let table = probe.memory.in_force().to_vec();
         let store = probe.memory.store().ok();
         let (calibration, false_alarm) = store.map_or((None, None), |store| {
@@ -412,23 +412,23 @@ impl Kept {
     }
 }
 
-fn now_ns(probe: &mut SimProbe<'_, Heard>) -> u64 {
+fn now_ns(probe: &mut SimProbe<'_, HostLog>) -> u64 {
     probe.rig.servo.rig().now().as_nanos() as u64
 }
 
 /// Sends the probe a command; returns the reason why it was not done, in its words.
-fn send(probe: &mut SimProbe<'_, Heard>, command: Command) -> Result<(), String> {
+fn send(probe: &mut SimProbe<'_, HostLog>, command: Command) -> Result<(), String> {
     block_on(probe.perform::<Plain>(&command)).map_err(|why| why.to_string())
 }
 
-fn ask(probe: &mut SimProbe<'_, Heard>, case: &Case) -> Result<(), String> {
+fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {
     case.commands()
         .into_iter()
         .try_for_each(|command| send(probe, command))
 }
 
 /// The rig comes to rest, with its motors off and its finger lifted; the largest force until then, N.
-fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<String>) -> f64 {
+fn rest(probe: &mut SimProbe<'_, HostLog>, host: &RefCell<HostLog>, wrong: &mut Vec<String>) -> f64 {
     let servo = &mut probe.rig.servo;
     let ends = servo.rig().now() + Duration::from_secs(REST_S);
     // a lever that nothing drives is at rest, too, while it runs down
@@ -466,7 +466,7 @@ fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<
 
 /// Everything is repaired: the rig homes, and carries out a request.
 fn repaired(
-    probe: &mut SimProbe<'_, Heard>,
+    probe: &mut SimProbe<'_, HostLog>,
     case: &Case,
     calibrated: bool,
     wrong: &mut Vec<String>,

@@ -281,9 +281,9 @@ impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
 }
 
 /// Passes events to the host.
-pub struct Told<'p, H>(&'p RefCell<H>);
+pub struct HostSink<'p, H>(&'p RefCell<H>);
 
-impl<H: Host> Events for Told<'_, H> {
+impl<H: Host> Events for HostSink<'_, H> {
     fn tell(&mut self, event: Event) {
         self.0.borrow_mut().tell(event);
     }
@@ -299,7 +299,7 @@ impl<H: Host> Events for Told<'_, H> {
 
 /// A simulated probe.
 pub type SimProbe<'p, H, R = SimRig> =
-    Probe<'p, ServoRig<SimServo<'p, H, R>>, RamFlash, TableCopy, Told<'p, H>>;
+    Probe<'p, ServoRig<SimServo<'p, H, R>>, RamFlash, TableCopy, HostSink<'p, H>>;
 
 /// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table
 /// that comes with the firmware. `buffer` takes the longest table.
@@ -327,7 +327,7 @@ pub fn switch_on<'p, H: Host, R: Driven>(
     let mut probe = Probe {
         rig,
         memory: Memory::new(Ok(store), TableCopy::default(), factory, buffer),
-        events: Told(host),
+        events: HostSink(host),
         plan,
     };
     block_on(probe.memory.reload(&mut probe.events));
