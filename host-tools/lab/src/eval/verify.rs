@@ -27,9 +27,9 @@ pub struct Verified {
     /// After one slide, two, three.
     pub verify: Vec<After>,
     /// Answers for the reference's own slides, which end with an answer or with the last slide.
-    pub same: Told,
+    pub same: AnswerShares,
     /// Answers for another texture's slides.
-    pub other: Told,
+    pub other: AnswerShares,
 }
 
 /// Shares after so many slides.
@@ -49,7 +49,7 @@ pub struct After {
 
 /// Shares of answers, which add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Told {
+pub struct AnswerShares {
     /// "The same."
     pub same: f64,
     /// "Different."
@@ -61,7 +61,7 @@ pub struct Told {
 }
 
 /// The comparison of the slides of one episode with one reference.
-struct Visit {
+struct Episode {
     is_same: bool,
     scores: [f64; SLIDES],
     answers: [Answer; SLIDES],
@@ -107,7 +107,7 @@ pub fn verify(
         ..config
     };
     let textures = experiment.names().len();
-    let visits: Vec<Vec<Visit>> = (0..runs)
+    let episodes: Vec<Vec<Episode>> = (0..runs)
         .into_par_iter()
         .panic_fuse()
         .map(|index| {
@@ -119,21 +119,21 @@ pub fn verify(
             for _ in 0..OTHERS {
                 references.push(other(run.random.random_range(0..textures - 1)));
             }
-            let visits = references.into_iter().map(|reference| {
+            let episodes = references.into_iter().map(|reference| {
                 // the same slides for all references
-                visit(&experiment, &bytes, config, run.clone(), reference)
+                episode(&experiment, &bytes, config, run.clone(), reference)
             });
-            let visits = visits.collect();
+            let episodes = episodes.collect();
             done();
-            visits
+            episodes
         })
         .collect::<Result<_, VerifyError>>()?;
-    let visits: Vec<Visit> = visits.into_iter().flatten().collect();
+    let episodes: Vec<Episode> = episodes.into_iter().flatten().collect();
     let told = |same: bool| {
-        let of: Vec<_> = visits.iter().filter(|v| v.is_same == same).collect();
+        let of: Vec<_> = episodes.iter().filter(|e| e.is_same == same).collect();
         let all = of.len().max(1) as f64;
         let share = |answer| of.iter().filter(|v| v.end.0 == answer).count() as f64 / all;
-        Told {
+        AnswerShares {
             same: share(Answer::Same),
             different: share(Answer::Different),
             unsure: share(Answer::Unsure),
@@ -141,23 +141,25 @@ pub fn verify(
         }
     };
     Ok(Verified {
-        verify: (0..SLIDES).map(|after| After::of(&visits, after)).collect(),
+        verify: (0..SLIDES)
+            .map(|after| After::of(&episodes, after))
+            .collect(),
         same: told(true),
         other: told(false),
     })
 }
 
 /// Compares the slides of a run with one texture of the table.
-fn visit(
+fn episode(
     experiment: &Experiment,
     bytes: &[u8],
     config: Config,
     mut run: Run<'_>,
     reference: usize,
-) -> Result<Visit, VerifyError> {
+) -> Result<Episode, VerifyError> {
     let candidates = [reference as u16];
     let mut explorer = explorer(bytes, experiment.measured(), config, Some(&candidates))?;
-    let mut visit = Visit {
+    let mut episode = Episode {
         is_same: run.unknown == reference,
         scores: [0.0; SLIDES],
         answers: [Answer::Unsure; SLIDES],
@@ -165,7 +167,7 @@ fn visit(
     };
     let mut made = 0;
     let mut missing = 0;
-    while made < SLIDES || visit.end.0 == Answer::Unsure && made < config.max_slides.into() {
+    while made < SLIDES || episode.end.0 == Answer::Unsure && made < config.max_slides.into() {
         let action = explorer.choose(&[], 0);
         let Some(slide) = run.slide(action.movement.into()) else {
             missing += 1;
@@ -178,34 +180,38 @@ fn visit(
             .observe(action, slide)
             .expect("every slide has the features that the table was learned from");
         let verification = explorer.verification().ok_or(VerifyError::NoLimits)?;
-        let after = visit.scores.iter_mut().zip(&mut visit.answers).nth(made);
+        let after = episode
+            .scores
+            .iter_mut()
+            .zip(&mut episode.answers)
+            .nth(made);
         if let Some((score, answer)) = after {
             (*score, *answer) = (verification.score.into(), verification.answer);
         }
         made += 1;
-        if visit.end.0 == Answer::Unsure {
-            visit.end = (verification.answer, made);
+        if episode.end.0 == Answer::Unsure {
+            episode.end = (verification.answer, made);
         }
     }
     // where slides ran out, the last state counts
     for after in made.max(1)..SLIDES {
-        visit.scores[after] = visit.scores[after - 1];
-        visit.answers[after] = visit.answers[after - 1];
+        episode.scores[after] = episode.scores[after - 1];
+        episode.answers[after] = episode.answers[after - 1];
     }
-    Ok(visit)
+    Ok(episode)
 }
 
 impl After {
-    fn of(visits: &[Visit], after: usize) -> Self {
+    fn of(episodes: &[Episode], after: usize) -> Self {
         let scores = |same: bool| {
-            let of = visits.iter().filter(|v| v.is_same == same);
+            let of = episodes.iter().filter(|e| e.is_same == same);
             let mut scores: Vec<f64> = of.map(|v| v.scores[after]).collect();
             scores.sort_by(f64::total_cmp);
             scores
         };
         let [own, others] = [scores(true), scores(false)];
         let answered = |same: bool, answer| {
-            let of = visits.iter().filter(|v| v.is_same == same);
+            let of = episodes.iter().filter(|e| e.is_same == same);
             let wrong = of.clone().filter(|v| v.answers[after] == answer).count();
             wrong as f64 / of.count().max(1) as f64
         };
@@ -315,15 +321,15 @@ pub fn false_accept<const N: usize>(explorer: &Explorer<'_, N>, reference: u16) 
         let twelve = (0..12).map(|_| random.random::<f32>()).sum::<f32>();
         twelve - 6.0
     };
-    let visits: Vec<(u8, u8)> = explorer.observed().map(|(m, k, _)| (m, k)).collect();
+    let observed: Vec<(u8, u8)> = explorer.observed().map(|(m, k, _)| (m, k)).collect();
     let (mut all, mut accepted) = (0, 0);
     for texture in (0..table.textures()).filter(|&texture| texture != reference) {
         let taught = |(movement, _): &(u8, u8)| table.trials(texture, *movement) > 0;
-        if visits.is_empty() || !visits.iter().all(taught) {
+        if observed.is_empty() || !observed.iter().all(taught) {
             continue;
         }
         for _ in 0..DRAWN {
-            let drawn = visits.iter().map(|&(movement, slides)| {
+            let drawn = observed.iter().map(|&(movement, slides)| {
                 // the mean of the slides, and the uncertainty of the texture's own
                 let n = f32::from(table.trials(texture, movement));
                 let sd = (1.0 / f32::from(slides) + 1.0 / n).sqrt() * WHITE_STEPS;

@@ -428,7 +428,11 @@ fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {
 }
 
 /// The rig comes to rest, with its motors off and its finger lifted; the largest force until then, N.
-fn rest(probe: &mut SimProbe<'_, HostLog>, host: &RefCell<HostLog>, wrong: &mut Vec<String>) -> f64 {
+fn rest(
+    probe: &mut SimProbe<'_, HostLog>,
+    host: &RefCell<HostLog>,
+    wrong: &mut Vec<String>,
+) -> f64 {
     let servo = &mut probe.rig.servo;
     let ends = servo.rig().now() + Duration::from_secs(REST_S);
     // a lever that nothing drives is at rest, too, while it runs down
