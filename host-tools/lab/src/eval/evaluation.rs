@@ -46,7 +46,7 @@ pub struct Evaluation {
 
 /// Settings of an evaluation.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked {
+pub struct EvaluationRequest {
     /// Method of the runs.
     pub method: Method,
     /// The protocol's name.
@@ -71,16 +71,16 @@ pub type Stage<'s> = dyn FnMut(&(dyn Fn() + Sync)) -> Result<(), EvaluateError> 
 /// See [`EvaluateError`].
 pub fn evaluation(
     experiment: Experiment,
-    asked: &Asked,
+    request: &EvaluationRequest,
     mut stage: impl FnMut([u32; 2], &mut Stage<'_>) -> Result<(), EvaluateError>,
 ) -> Result<(Evaluation, Vec<Course>), EvaluateError> {
-    let Asked {
+    let EvaluationRequest {
         config,
         runs,
         method,
         ..
-    } = *asked;
-    let stages = if asked.with_courses { 3 } else { 2 };
+    } = *request;
+    let stages = if request.with_courses { 3 } else { 2 };
     let mut outcomes = Vec::new();
     stage([1, stages], &mut |done| {
         outcomes = evaluate(&experiment, config, runs, done)?;
@@ -94,7 +94,7 @@ pub fn evaluation(
         Ok(())
     })?;
     let mut all = Vec::new();
-    if asked.with_courses {
+    if request.with_courses {
         stage([3, stages], &mut |done| {
             all = courses(&experiment, config, runs, done)?;
             Ok(())
@@ -105,13 +105,13 @@ pub fn evaluation(
         reliability: statements(&all, config.threshold),
         by_threshold: by_threshold(&all, config.threshold),
         method,
-        protocol: asked.protocol,
+        protocol: request.protocol,
         train_slides: experiment.train_slides(),
         runs,
         textures: names.len(),
         threshold: config.threshold,
         max_slides: config.max_slides,
-        seed: asked.seed,
+        seed: request.seed,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
         mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
         summary,
