@@ -13,7 +13,7 @@ use tactus_lab::sim::recorded::RecordedTexture;
 
 use super::args::{World, hex_sha256};
 use super::progress;
-use super::under_finger::{self, Known, KnownError, TRIALS, Unknown};
+use super::under_finger::{self, FirmwareData, KnownError, TRIALS, Unknown};
 
 /// The source of the textures.
 enum Textures {
@@ -64,7 +64,7 @@ impl Chosen {
     }
 
     /// Calibration of the rig and table of the textures for a method, or the table of a file.
-    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<Known, KnownError> {
+    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<FirmwareData, KnownError> {
         let kept = self.kept_in(method);
         let mut known = match kept.as_deref().and_then(read) {
             Some(known) => known,
@@ -86,7 +86,7 @@ impl Chosen {
         Ok(known)
     }
 
-    fn learn_anew(&self, method: Method) -> Result<Known, KnownError> {
+    fn learn_anew(&self, method: Method) -> Result<FirmwareData, KnownError> {
         let bar;
         let known = match &self.textures {
             Textures::Simulated(finger, collection) => {
@@ -131,17 +131,17 @@ impl Chosen {
 /// Bytes of constants of a finger that was not turned over ([`RigCalibration::to_bytes`]).
 const CALIBRATION_BYTES: usize = 60;
 
-fn read(file: &Path) -> Option<Known> {
+fn read(file: &Path) -> Option<FirmwareData> {
     let bytes = std::fs::read(file).ok()?;
     let (calibration, table) = bytes.split_at_checked(CALIBRATION_BYTES)?;
     Table::read(table).ok()?;
-    Some(Known {
+    Some(FirmwareData {
         calibration: RigCalibration::from_bytes(calibration).ok()?,
         table: table.into(),
     })
 }
 
-fn write(file: &Path, known: &Known) -> std::io::Result<()> {
+fn write(file: &Path, known: &FirmwareData) -> std::io::Result<()> {
     if let Some(folder) = file.parent() {
         std::fs::create_dir_all(folder)?;
     }

@@ -61,7 +61,7 @@ pub enum KnownError {
 
 /// The firmware's calibration and table.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Known {
+pub struct FirmwareData {
     /// Constants of the rig.
     pub calibration: RigCalibration,
     /// The texture table.
@@ -95,7 +95,7 @@ pub fn simulated(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, KnownError> {
+) -> Result<FirmwareData, KnownError> {
     simulated_with(FingerName::Biotac, collection, method, done)
 }
 
@@ -105,13 +105,13 @@ pub fn simulated_with(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, KnownError> {
+) -> Result<FirmwareData, KnownError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let setup = collection.setup_with(finger, first, 0);
     let calibration = calibrated(setup).map_err(LearnError::from)?;
     let movements = &Collection::MOVEMENTS;
     let table = collection.learn_with(finger, movements, method, calibration, done)?;
-    Ok(Known { calibration, table })
+    Ok(FirmwareData { calibration, table })
 }
 
 /// As [`simulated`], with statistics of shorter slides: the rig's image ends slides as soon as it is certain.
@@ -119,12 +119,12 @@ pub fn simulated_early(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, KnownError> {
+) -> Result<FirmwareData, KnownError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
     let lengths_ms = &Collection::LENGTHS_MS;
     let table = collection.learn_lengths(method, calibration, lengths_ms, done)?;
-    Ok(Known { calibration, table })
+    Ok(FirmwareData { calibration, table })
 }
 
 /// A texture of a simulated world in a trial that nothing was learned from: those from 1 on.
@@ -175,10 +175,13 @@ pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownErr
 }
 
 /// Learns the recorded textures for a method.
-pub fn recorded(recorded_texture: &RecordedTexture, method: Method) -> Result<Known, KnownError> {
+pub fn recorded(
+    recorded_texture: &RecordedTexture,
+    method: Method,
+) -> Result<FirmwareData, KnownError> {
     let calibration = calibrated(RecordedTexture::setup(0)).map_err(LearnError::from)?;
     let table = recorded_texture.learn(method, calibration)?;
-    Ok(Known { calibration, table })
+    Ok(FirmwareData { calibration, table })
 }
 
 /// Number of a material by its name, in any case, or by its number from 1.
