@@ -23,4 +23,4 @@ mod tracer;
 pub use accelerator::Accelerator;
 pub use pipeline::{Core, Executed};
 pub(crate) use tracer::Tracer;
-pub use tracer::{CycleProfile, Load, Spent};
+pub use tracer::{CycleCount, CycleProfile, Load};

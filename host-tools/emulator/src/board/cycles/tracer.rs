@@ -25,14 +25,14 @@ const RETURN: u32 = 24;
 
 /// Instructions, and the cycles that they take by the model.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Spent {
+pub struct CycleCount {
     /// Instructions.
     pub instructions: u64,
     /// Cycles, with those of exceptions that are entered and left.
     pub cycles: u64,
 }
 
-impl Spent {
+impl CycleCount {
     /// Cycles per instruction; 0 of none.
     pub fn ratio(self) -> f64 {
         match self.instructions {
@@ -42,14 +42,14 @@ impl Spent {
     }
 }
 
-impl AddAssign for Spent {
+impl AddAssign for CycleCount {
     fn add_assign(&mut self, other: Self) {
         self.instructions += other.instructions;
         self.cycles += other.cycles;
     }
 }
 
-impl Sum for Spent {
+impl Sum for CycleCount {
     fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
         let mut sum = Self::default();
         parts.for_each(|part| sum += part);
@@ -63,21 +63,21 @@ pub struct Load {
     /// Its beginning, ns of virtual time.
     pub at_ns: u64,
     /// The cycles.
-    pub spent: Spent,
+    pub spent: CycleCount,
 }
 
 /// Cycles in parts of a millisecond and by groups of handlers; the last group is all the rest.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct CycleProfile {
-    bins: BTreeMap<u64, Vec<Spent>>,
+    bins: BTreeMap<u64, Vec<CycleCount>>,
     /// Instructions that were executed outside of the image's code, which are not modelled.
     pub unseen: u64,
 }
 
 impl CycleProfile {
-    fn add(&mut self, at_ns: u64, groups: usize, group: usize, spent: Spent) {
+    fn add(&mut self, at_ns: u64, groups: usize, group: usize, spent: CycleCount) {
         let bin = self.bins.entry(at_ns / BIN_NS);
-        let bin = bin.or_insert_with(|| vec![Spent::default(); groups]);
+        let bin = bin.or_insert_with(|| vec![CycleCount::default(); groups]);
         if let Some(so_far) = bin.get_mut(group) {
             *so_far += spent;
         }
@@ -89,7 +89,7 @@ impl CycleProfile {
             let here = self
                 .bins
                 .entry(bin)
-                .or_insert_with(|| vec![Spent::default(); spent.len()]);
+                .or_insert_with(|| vec![CycleCount::default(); spent.len()]);
             here.iter_mut()
                 .zip(spent)
                 .for_each(|(here, spent)| *here += spent);
@@ -98,7 +98,7 @@ impl CycleProfile {
     }
 
     /// The sum of some groups.
-    pub fn total(&self, groups: Range<usize>) -> Spent {
+    pub fn total(&self, groups: Range<usize>) -> CycleCount {
         let bins = self.bins.values();
         bins.flat_map(|bin| bin.get(groups.clone()))
             .flatten()
@@ -107,12 +107,12 @@ impl CycleProfile {
     }
 
     /// The millisecond in which some groups spent most by a measure, of those in which they did something all the time.
-    pub fn worst(&self, groups: Range<usize>, measure: fn(Spent) -> f64) -> Load {
+    pub fn worst(&self, groups: Range<usize>, measure: fn(CycleCount) -> f64) -> Load {
         let mut worst = Load::default();
         for first in self.bins.keys() {
             let bins = self.bins.range(first..&(first + BINS));
             let bins = bins.map(|(_, bin)| bin.get(groups.clone()).unwrap_or_default());
-            let bins: Vec<Spent> = bins.map(|bin| bin.iter().copied().sum()).collect();
+            let bins: Vec<CycleCount> = bins.map(|bin| bin.iter().copied().sum()).collect();
             let is_whole = bins.len() as u64 == BINS;
             let spent = bins.into_iter().sum();
             if is_whole && measure(spent) > measure(worst.spent) {
@@ -232,7 +232,7 @@ impl Tracer {
     }
 
     fn spend(&mut self, at_ns: u64, group: usize, instructions: u64, cycles: u64) {
-        let spent = Spent {
+        let spent = CycleCount {
             instructions,
             cycles,
         };
@@ -352,8 +352,8 @@ fn resolve(address: Address, host: &mut dyn Host) -> Option<u32> {
 mod tests {
     use super::*;
 
-    fn spent(instructions: u64, cycles: u64) -> Spent {
-        Spent {
+    fn spent(instructions: u64, cycles: u64) -> CycleCount {
+        CycleCount {
             instructions,
             cycles,
         }
@@ -370,10 +370,13 @@ mod tests {
         }
         // a single one is no millisecond
         profile.add(100 * BIN_NS, 2, 0, spent(1, 1000));
-        let worst = profile.worst(0..1, Spent::ratio);
+        let worst = profile.worst(0..1, CycleCount::ratio);
         assert_eq!(worst.spent, spent(400, 1000));
         assert_eq!(worst.at_ns, 4 * BIN_NS);
-        assert_eq!(profile.worst(0..2, Spent::ratio).spent, spent(600, 1200));
+        assert_eq!(
+            profile.worst(0..2, CycleCount::ratio).spent,
+            spent(600, 1200)
+        );
         assert_eq!(profile.total(1..2), spent(500, 500));
         assert_eq!(profile.total(0..2).instructions, 1501);
     }
