@@ -8,7 +8,7 @@ use super::ascent::{Ascent, RELEASE_MS, is_far};
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{Guard, Seen, Switch, Unguarded, force_limit_mn, may_press};
+use super::guard::{Guard, GuardInputs, Switch, Unguarded, force_limit_mn, may_press};
 use super::lever::{Lever, LeverState};
 use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 use super::pins::{Inputs, Outputs};
@@ -432,7 +432,7 @@ impl Control {
             StageState::Moving(profile) => profile.velocity_mm_s(),
             _ => 0.0,
         };
-        let seen = Seen {
+        let seen = GuardInputs {
             words: &inputs.words,
             e_stop: inputs.e_stop,
             hung: inputs.hung,

@@ -77,7 +77,7 @@ impl Unguarded {
 
 /// The guard's inputs of one millisecond.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
+pub struct GuardInputs<'a> {
     /// Words since the last millisecond; `None` is a damaged one.
     pub words: &'a [Option<Pressure>],
     /// The emergency stop.
@@ -163,23 +163,23 @@ impl Guard {
     #[inline]
     pub fn tick(
         &mut self,
-        seen: &Seen<'_>,
+        inputs: &GuardInputs<'_>,
         meter: &ForceMeter,
         model: &FingerModel,
         mn_per_count: f32,
         limit_mn: f32,
     ) -> Option<Fault> {
-        let sensor = self.sensor(seen.words);
-        let stage = self.stage(seen);
+        let sensor = self.sensor(inputs.words);
+        let stage = self.stage(inputs);
         // its second contact has taken the motors' supply by then
-        let e_stop = self.e_stop.tick(seen.e_stop);
-        let lever_top = self.lever_top.tick(seen.lever_top);
-        self.left_ms = if seen.lever_left {
+        let e_stop = self.e_stop.tick(inputs.e_stop);
+        let lever_top = self.lever_top.tick(inputs.lever_top);
+        self.left_ms = if inputs.lever_left {
             self.left_ms.saturating_add(1)
         } else {
             0
         };
-        let stage_limit = self.stage_limit.tick(seen.stage_limit);
+        let stage_limit = self.stage_limit.tick(inputs.stage_limit);
         // a calibration with less than the model's force per count does not allow more
         let mn_per_count = mn_per_count.max(model.calibration.force_mn_per_count);
         let force = meter.counts().max(meter.counts_now()) * mn_per_count
@@ -187,7 +187,7 @@ impl Guard {
         [
             force.then_some(Fault::ForceHigh),
             e_stop.then_some(Fault::EStop),
-            seen.hung.then_some(Fault::TasksHung),
+            inputs.hung.then_some(Fault::TasksHung),
             lever_top.then_some(Fault::LeverLimit),
             (self.left_ms >= LEFT_MS).then_some(Fault::LeverNotHome),
             stage_limit.then_some(Fault::StageLimit),
@@ -250,8 +250,8 @@ impl Guard {
     }
 
     #[inline]
-    fn stage(&mut self, seen: &Seen<'_>) -> Option<Fault> {
-        let wanted = libm::fabsf(seen.stage_wanted_mm_s);
+    fn stage(&mut self, inputs: &GuardInputs<'_>) -> Option<Fault> {
+        let wanted = libm::fabsf(inputs.stage_wanted_mm_s);
         let Some(slot) = self
             .motion
             .get(self.motion_ms.wrapping_sub(1) % MOTION_MS)
@@ -263,8 +263,8 @@ impl Guard {
         let [expected, _, turned] = if self.motion_ms == 0 { [0.0; 3] } else { *slot };
         let now = [
             expected + wanted * 1e-3,
-            seen.stage_mm,
-            turned + libm::fabsf(seen.emf_mm_s) * 1e-3,
+            inputs.stage_mm,
+            turned + libm::fabsf(inputs.emf_mm_s) * 1e-3,
         ];
         let oldest = self.motion.get_mut(self.motion_ms % MOTION_MS)?;
         let before = core::mem::replace(oldest, now);

@@ -10,7 +10,7 @@ use super::ascent::is_far;
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{Guard, Seen, Unguarded, force_limit_mn, may_press};
+use super::guard::{Guard, GuardInputs, Unguarded, force_limit_mn, may_press};
 use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
@@ -371,7 +371,7 @@ impl RigOverLink {
 
     /// The guard's fault, from sensor and force; all else belongs to the arm.
     fn watch(&mut self, inputs: &Inputs) -> Option<Fault> {
-        let seen = Seen {
+        let seen = GuardInputs {
             words: &inputs.words,
             e_stop: false,
             hung: inputs.hung,
