@@ -146,7 +146,9 @@ const LOOKS: u32 = 1000;
 /// The core after its reset.
 pub(crate) const RESET_HZ: u32 = 16_000_000;
 
-/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all.
+/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all. Board tests break it by its name.
+#[unsafe(export_name = "tactus_board_start")]
+#[inline(never)]
 pub(crate) fn start() -> AssignedResources {
     // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at either
     // level.

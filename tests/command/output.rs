@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use serde_json::Value;
 
 const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
 
@@ -220,59 +219,6 @@ fn the_environment_names_the_recordings_and_the_port() {
         said.contains("127.0.0.1:1") && said.contains("emulated board"),
         "{said}"
     );
-}
-
-#[test]
-fn a_file_of_settings_says_port_recordings_and_defaults() {
-    let temp = tempfile::tempdir().unwrap();
-    let below = temp.path().join("a/b");
-    std::fs::create_dir_all(&below).unwrap();
-    let copied = temp.path().join("mine");
-    std::fs::create_dir(&copied).unwrap();
-    for entry in std::fs::read_dir(SIMULATED).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), copied.join(entry.file_name())).unwrap();
-    }
-    let file = temp.path().join("tactus.toml");
-    let settings =
-        "port = \"127.0.0.1:1\"\nrecordings = \"mine\"\n[defaults.features]\nformat = \"csv\"\n";
-    std::fs::write(&file, settings).unwrap();
-    let run = |arguments: &[&str]| {
-        let mut run = command(arguments);
-        run.current_dir(&below).env_remove("TACTUS_CONFIG");
-        run.output().unwrap()
-    };
-    let csv = run(&["features"]).stdout;
-    assert_eq!(String::from_utf8(csv).unwrap().lines().count(), 55);
-    // what is given goes before
-    let json = String::from_utf8(run(&["features", "--format", "json"]).stdout).unwrap();
-    assert!(json.starts_with('{'), "{json}");
-    let status = run(&["device", "status"]);
-    assert!(String::from_utf8_lossy(&status.stderr).contains("127.0.0.1:1"));
-    let shown: Value =
-        serde_json::from_slice(&run(&["config", "--format", "json"]).stdout).unwrap();
-    assert_eq!(shown["port"], "127.0.0.1:1");
-    assert_eq!(shown["defaults"]["features"]["format"], "csv");
-    let shown = run(&["config"]).stdout;
-    assert!(String::from_utf8_lossy(&shown).contains("tactus features --format="));
-    // another command has no such default
-    let textures = run(&["textures"]);
-    assert!(textures.status.success(), "{textures:?}");
-    for (wrong, says) in [
-        ("prot = \"x\"", "prot"),
-        ("[defaults.featurs]\nformat = \"csv\"", "featurs"),
-        ("[defaults.features]\nfromat = \"csv\"", "--fromat"),
-        ("port = ", "tactus config --help"),
-    ] {
-        std::fs::write(&file, wrong).unwrap();
-        let refused = run(&["features"]);
-        assert_eq!(refused.status.code(), Some(1), "{wrong}");
-        let said = String::from_utf8(refused.stderr).unwrap();
-        assert!(
-            said.contains(says) && said.contains("tactus.toml"),
-            "{said}"
-        );
-    }
 }
 
 #[test]

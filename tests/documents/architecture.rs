@@ -5,7 +5,7 @@ use syn::visit::Visit;
 /// Rooms of a crate in steps: a room uses those of earlier steps only. An image of the firmware knows no other image.
 const ROOMS: &str = "
 shared/src/ sensor < dsp < features < table < explorer rig < store < wire < probe < handheld
-firmware/src/ board < chip < tasks < bench selftest handheld rig arm
+firmware/src/ board < chip < tasks < boot < bench selftest handheld rig arm
 host-tools/lab/src/ data < eval < sim < live < remote
 host-tools/emulator/src/ board < host < scenario < runs";
 /// Crates of the project that a crate may depend on.

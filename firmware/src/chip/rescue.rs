@@ -83,7 +83,7 @@ pub(crate) fn remember(text: &str) {
 
 /// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing here
 /// needs an interrupt, memory or another task.
-fn give_up(why: &str) -> ! {
+pub(crate) fn give_up(why: &str) -> ! {
     cortex_m::interrupt::disable();
     remember(why);
     if ARMED.load(Relaxed) {

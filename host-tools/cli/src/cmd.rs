@@ -2,9 +2,9 @@
 
 mod args;
 mod completions;
-mod config;
 mod convert;
 mod device;
+mod environment;
 mod evaluate;
 mod features;
 mod identify;
@@ -69,7 +69,6 @@ enum Command {
     Completions(completions::Args),
     Import(import::Args),
     Convert(convert::Args),
-    Config(config::Args),
     Unpack(unpack::Args),
 }
 
@@ -82,7 +81,6 @@ const CONVENTIONS: &str = "\
 Environment:
   TACTUS_RECORDINGS   the folder, where --recordings is not given
   TACTUS_PORT         the probe's port, where --port is not given
-  TACTUS_CONFIG       the file of settings, in place of tactus.toml: `tactus config --help`
 
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
@@ -90,15 +88,13 @@ Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those k
 pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
-    let arguments = config::read(&Tactus::command(), std::env::args_os())?;
     let Tactus {
         quiet,
         verbose,
         command,
-    } = Tactus::parse_from(arguments);
+    } = Tactus::parse();
     verbose::be_verbose(verbose);
-    config::tell();
-    if quiet || config::is_quiet() {
+    if quiet {
         progress::be_quiet();
     }
     match command {
@@ -118,7 +114,6 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Completions(args)) => completions::run(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,
-        Some(Command::Config(args)) => config::run(&args, out)?,
         Some(Command::Unpack(args)) => unpack::run(&args, out)?,
     }
     out.flush()?;

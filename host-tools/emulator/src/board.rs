@@ -35,7 +35,6 @@ pub use flash::{FLASH, FlashWrite, STORE, places};
 pub use handler_profile::HandlerProfile;
 pub use motion::MotionPeer;
 pub use options::Options;
-pub(crate) use record::CONTACT_N;
 pub use record::{Slide, Touch};
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;

@@ -4,8 +4,5 @@ pub mod control;
 pub mod evaluation;
 pub mod exploration;
 pub mod map;
-pub mod novelty;
-pub mod session;
 mod spectrum;
-pub mod timeline;
 pub mod trade_off;

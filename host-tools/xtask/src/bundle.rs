@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use crate::campaign::{FOLDER, TABLES};
-use crate::firmware::{self, hash, released, shown};
+use crate::firmware::{self, IMAGES, hash, shown};
 use crate::shell::{self, root, run, target};
 use crate::toolchain::{self, BROWSER};
 use crate::{page, python};
@@ -104,7 +104,7 @@ fn command() -> Result<(String, PathBuf)> {
 
 /// All that `--only` knows.
 fn names() -> Vec<&'static str> {
-    [&released()[..], &PRODUCTS.map(|product| product.name)].concat()
+    [&IMAGES[..], &PRODUCTS.map(|product| product.name)].concat()
 }
 
 /// Builds what was asked for and writes the release.
@@ -121,7 +121,7 @@ pub(crate) fn bundle(options: &Options) -> Result<()> {
 /// Everything that is in a release, or what of it is named.
 fn files(only: &[String]) -> Result<Files> {
     let wanted = |name: &str| only.is_empty() || only.iter().any(|one| one == name);
-    let images: Vec<&str> = released().into_iter().filter(|name| wanted(name)).collect();
+    let images: Vec<&str> = IMAGES.into_iter().filter(|name| wanted(name)).collect();
     let (mut files, mut parts) = (Files::new(), Vec::new());
     if !images.is_empty() {
         for elf in firmware::compile(&images)? {
@@ -226,7 +226,7 @@ mod tests {
         let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
         let files = rows.filter_map(|row| row.split(" |").next());
         let named: Vec<&str> = files.flat_map(|files| files.split(", ")).collect();
-        for image in released() {
+        for image in IMAGES {
             let elf = format!("{image}.elf");
             assert!(
                 named.iter().any(|name| *name == image || *name == elf),

@@ -13,7 +13,7 @@ Examples:
   cargo xtask emulate --texture 10 --log     with the firmware's own log
   cargo xtask emulate --finger mems          with another finger: analog or mems
   cargo xtask emulate --handheld             a hand that explores with the handheld
-  cargo xtask emulate --handheld --motion    the handheld with a sensor of motion, in a hand
+  cargo xtask emulate --handheld --motion    with a sensor of motion, too
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options";
 
@@ -21,8 +21,6 @@ Examples:
 pub(crate) const RIG: &str = "tactus-rig";
 /// The image that a hand holds.
 pub(crate) const HANDHELD: &str = "tactus-handheld";
-/// The same with a sensor of motion.
-pub(crate) const MOTION: &str = "tactus-handheld-motion";
 /// The image of a probe on somebody else's arm.
 pub(crate) const ARM: &str = "tactus-arm";
 
@@ -62,15 +60,12 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
         let elf = if help || named {
             None
         } else {
-            let kind = match run {
-                "handheld" if options.iter().any(|o| o == "--motion") => MOTION,
+            let image = match run {
                 "handheld" => HANDHELD,
                 _ if value(options, "--arm-port").is_some() => ARM,
                 _ => RIG,
             };
-            let image = firmware::image_for(kind, value(options, "--finger").as_deref())?;
-            let elf = firmware::compile(&[&image])?.remove(0);
-            Some(elf)
+            Some(firmware::compile(&[image])?.remove(0))
         };
         emulator.join().expect("a build does not panic")?;
         anyhow::Ok(elf)
@@ -131,11 +126,7 @@ pub(crate) fn with_images<'t>(
         ("TACTUS_SELFTEST_ELF", "tactus-selftest"),
         ("TACTUS_SILICON_ELF", "tactus-silicon"),
         ("TACTUS_HANDHELD_ELF", HANDHELD),
-        ("TACTUS_MOTION_ELF", MOTION),
         ("TACTUS_ARM_ELF", ARM),
-        ("TACTUS_ANALOG_ELF", "tactus-rig-analog"),
-        ("TACTUS_MEMS_ELF", "tactus-rig-mems"),
-        ("TACTUS_HANDHELD_MEMS_ELF", "tactus-handheld-mems"),
     ];
     for (variable, name) in images {
         tests.env(variable, firmware::image(elves, name)?);
@@ -148,7 +139,8 @@ fn cargo_there(command: &str) -> Command {
     let mut cargo = cargo();
     // its own configuration is read from there
     cargo.current_dir(root().join("host-tools/emulator"));
-    // the crate below says Rust 1.98 and builds on 1.95
+    // rigless declares Rust 1.98, and cranelift below it 1.96: they build with 1.95, which the README names, and these
+    // tests are run with that
     cargo.args([command, "--locked", "--ignore-rust-version"]);
     cargo.arg("--target-dir").arg(folder());
     cargo

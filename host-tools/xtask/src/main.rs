@@ -8,7 +8,6 @@ mod firmware;
 mod flash;
 mod page;
 mod python;
-mod reasons;
 mod shell;
 mod size;
 mod test;
@@ -38,6 +37,10 @@ enum Cli {
     /// last lines say what ran and how long it took, and what was skipped and why; tests that want recordings are
     /// skipped where there are none (TACTUS_REQUIRE_DATA=1 makes them fail instead). Longer checks:
     /// `cargo xtask campaign`.
+    ///
+    /// The images are built by the active toolchain if it has their target, or else by Debian's;
+    /// TACTUS_TOOLCHAIN=debian or TACTUS_TOOLCHAIN=active asks for one of them. The last line names the compiler that
+    /// made them.
     Test {
         /// Run this step only, in this process
         #[arg(long, value_name = "NAME")]
@@ -61,9 +64,9 @@ enum Cli {
     Campaign(campaign::Options),
     /// Count what the core's kernels cost on the chip
     ///
-    /// Instructions of the bench image on the emulated board, the same code as in the rig's image, on a slide of a real
-    /// finger where there is one; every result is compared with the plain kernels' on this PC. An error if a kernel
-    /// misses its gate.
+    /// Instructions of the bench in the silicon image on the emulated board, the same code as in the rig's image, on a
+    /// slide of a real finger where there is one; every result is compared with the plain kernels' on this PC. An error
+    /// if a kernel misses its gate.
     #[command(after_help = bench::EXAMPLES)]
     Bench(bench::Options),
     /// Build the firmware; list each image with its hash, its memory and the rig's deepest stack

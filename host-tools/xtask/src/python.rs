@@ -79,7 +79,7 @@ pub(crate) fn wheel() -> Result<PathBuf> {
         "--no-cache-dir",
     ]);
     pip.arg("--disable-pip-version-check");
-    pip.env("CARGO_ENCODED_RUSTFLAGS", rustflags(&[]));
+    pip.env("CARGO_ENCODED_RUSTFLAGS", rustflags());
     pip.env("CARGO_TARGET_DIR", target().join("wheel"));
     pip.env("MATURIN_PEP517_ARGS", "--locked");
     // the time of the files in it: the oldest that a zip file can say

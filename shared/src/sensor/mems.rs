@@ -219,6 +219,7 @@ impl PressureSensor for Mems {
 }
 
 /// Both parts, one after the other.
+#[allow(clippy::indexing_slicing)] // while compiling
 const START: [StartStep; iis3dwb::START.len() + ads1220::START.len()] = {
     let mut both = [iis3dwb::START[0]; iis3dwb::START.len() + ads1220::START.len()];
     let mut at = 0;

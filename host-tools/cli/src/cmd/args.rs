@@ -8,12 +8,12 @@ use tactus_core::features::FeatureSet;
 use tactus_core::table::{Drift, MAX_LENGTHS, is_false_alarm};
 use tactus_lab::eval::evaluate::Method;
 
-use super::config;
+use super::environment;
 use super::output::UsageError;
 
 #[derive(Args, Clone)]
 pub(crate) struct Recordings {
-    /// Folder of recordings; that of TACTUS_RECORDINGS or of tactus.toml unless given
+    /// Folder of recordings; that of TACTUS_RECORDINGS unless given
     #[arg(long, value_name = "DIR")]
     pub(crate) recordings: Option<PathBuf>,
 }
@@ -25,8 +25,8 @@ impl Recordings {
     /// Neither does.
     pub(crate) fn folder(&self) -> Result<PathBuf, UsageError> {
         let folder = self.recordings.clone();
-        folder.or_else(config::recordings).ok_or_else(|| {
-            let say = "give a folder of recordings: --recordings DIR, TACTUS_RECORDINGS in the environment, or `recordings` in tactus.toml";
+        folder.or_else(environment::recordings).ok_or_else(|| {
+            let say = "give a folder of recordings: --recordings DIR, or TACTUS_RECORDINGS in the environment";
             UsageError(say.to_owned())
         })
     }

@@ -41,13 +41,13 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
     if args.lifelong {
-        return novelty::lifelong(args, &experiment, config, canvas, out);
+        return novelty::lifelong(args, &experiment, config, out);
     }
     if args.verify {
         return verify::run(args, &experiment, protocol, config, canvas, out);
     }
     if args.novelty.is_some() {
-        return novelty::leave_one_out(args, &experiment, protocol, config, canvas, out);
+        return novelty::leave_one_out(args, &experiment, protocol, config, out);
     }
     // a program gets what the pictures show
     let with_courses = canvas.is_some() || args.format == Format::Json;

@@ -279,7 +279,7 @@ fn program(part: Part, finger: &str) -> Result<(std::ffi::OsString, Vec<String>)
         }
     };
     shell::run(&mut emulate::build())?;
-    let elf = firmware::compile(&[&firmware::image_for(image, Some(finger))?])?.remove(0);
+    let elf = firmware::compile(&[image])?.remove(0);
     let elf = elf.to_string_lossy().into_owned();
     let program = emulate::program("identify").get_program().to_owned();
     Ok((

@@ -31,7 +31,7 @@ pub(crate) struct Built {
 pub(crate) fn build() -> Result<Built> {
     let toolchain = toolchain::get(BROWSER)?;
     eprintln!("Building with {}", toolchain.version());
-    let mut cargo = toolchain.cargo_build(BROWSER, &[]);
+    let mut cargo = toolchain.cargo_build(BROWSER);
     cargo.arg("--release").arg("--manifest-path");
     run(cargo.arg(root().join(CRATE).join("Cargo.toml"))).context("the page does not build")?;
     let release = toolchain

@@ -142,8 +142,7 @@ impl Probe {
     /// The firmware on the emulated board.
     fn emulated() -> Result<Self> {
         run(&mut emulate::build())?;
-        let image = firmware::image_for(emulate::RIG, None)?;
-        let elf = firmware::compile(&[&image])?.remove(0);
+        let elf = firmware::compile(&[emulate::RIG])?.remove(0);
         let mut serves = emulate::program("serve");
         serves.args(["--port", "0", "--texture", "burlap", "--elf"]);
         let mut child = serves.arg(elf).stdout(Stdio::piped()).spawn()?;

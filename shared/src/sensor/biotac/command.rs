@@ -12,6 +12,7 @@ pub const REST_US: u32 = 10;
 pub const READ_MOSI: [u8; 2] = [0x00, 0x01];
 
 /// The bytes of the commands, by channel number. The second byte is ignored (SPM); 0 as in LIB.
+#[allow(clippy::indexing_slicing)] // while compiling
 const COMMANDS: &[[u8; 2]; Channel::E19 as usize + 1] = &{
     let mut all = [[0x00; 2]; Channel::E19 as usize + 1];
     let mut number = 0;
@@ -87,6 +88,7 @@ impl Channel {
     }
 
     /// The transactions for a sample of this channel: the command and, 50 us later, the read.
+    #[allow(clippy::indexing_slicing)] // the last channel is the last command
     pub const fn transactions(self) -> [Transaction; 2] {
         [
             Transaction::first_port(&COMMANDS[self as usize], 0, GAP_US),

@@ -16,7 +16,6 @@ use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_link::follow::{ALLOWED, Agreement, Follower};
 use tactus_study::chart::{DrawError, Figure};
 use tactus_study::pictures::exploration::Exploration;
-use tactus_study::pictures::timeline::{Timeline, Watch};
 
 use super::listen;
 use super::log::{Line, LogError, TableParts, read};
@@ -99,13 +98,11 @@ fn pictures(explorations: &[Logged]) -> Result<Vec<Figure>, DrawError> {
         let Some(table) = logged.table() else {
             continue;
         };
-        let (mut exploration, mut watch) = (Exploration::new(table), Watch::default());
-        for (event, at_ms) in logged.events.iter().zip(&logged.at_ms) {
+        let mut exploration = Exploration::new(table);
+        for event in &logged.events {
             exploration.event(event);
-            watch.report(*at_ms, event);
         }
         let mut figures = exploration.figures(logged.asked.threshold)?;
-        figures.extend(watch.last().map(Timeline::figure).transpose()?);
         for figure in &mut figures {
             if explorations.len() > 1 {
                 figure.id = format!("{number}-{}", figure.id);
