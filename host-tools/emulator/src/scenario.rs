@@ -222,7 +222,7 @@ impl Played<'_> {
         }
     }
 
-    /// Looks until it is so.
+    /// Looks until the condition holds.
     fn until(&mut self, within_s: f64, seen: impl Fn(&Display) -> bool) -> Result<bool, Error> {
         let Self { board, looks, .. } = self;
         let board = board.as_mut().expect("it was switched on");

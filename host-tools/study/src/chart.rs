@@ -317,7 +317,7 @@ impl<'a> Chart<'a> {
             if let (true, false, Some(&(x, mut y))) =
                 (self.named_at_end, series.name.is_empty(), at.last())
             {
-                // names do not cover each other, nor what is written below the axis
+                // names cover neither each other nor the words below the axis
                 let away = if y > (top + bottom) / 2 { -1 } else { 1 };
                 while ends.iter().any(|other| (other - y).abs() < LINE - 3) {
                     y += away;

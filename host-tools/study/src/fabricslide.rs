@@ -17,12 +17,12 @@
 //! 150 mm/s. The protocol's 15 movements remain, 120, 150 and 180 at 10, 20, 50, 100 and 120 mm/s, each with two slides
 //! per repetition. Tables are learned from repetition 0: the manifest holds out "repetition 2", which is its `rep` 1.
 //!
-//! Of the readings that were tried this one comes nearest to the protocol's figures, by an independent program (numpy,
-//! 8000 runs): 58 % right by the paper's way (the protocol says 56), 96 by Student-t (96), 100 in 2.8 slides by three
+//! Of the definitions that were tried this one comes nearest to the protocol's figures, by an independent program
+//! (numpy, 8000 runs): 58 % right by the paper's way (protocol: 56), 96 by Student-t (96), 100 in 2.8 slides by three
 //! properties fused (99.9 in 2.7), 100 by eight bands fused (100). With the repetitions exchanged it is 78, 97, 100 in
-//! 1.9, and 100. The paper's figure is brittle, for its standard deviations come of two slides: a Hann window that is
-//! symmetric instead of periodic makes it 50, so it does not tell readings apart. The facts do not define the spatial
-//! decorrelation; of two definitions the one taken fits, while 1 less the share of the common mode makes three
+//! 1.9, and 100. The paper's figure is brittle, for its standard deviations come from two slides: a Hann window that is
+//! symmetric instead of periodic makes it 50, so it does not decide between definitions. The facts do not define the
+//! spatial decorrelation; of two definitions the one taken fits, while 1 less the share of the common mode makes three
 //! properties fused 92.
 //!
 //! # What is measured

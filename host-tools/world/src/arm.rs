@@ -33,7 +33,7 @@ pub struct Arm {
     slope_mm: f64,
     x_mm: f64,
     height_mm: f64,
-    /// Along the sample and up: as wanted, and as they are, mm/s.
+    /// Velocity along the sample and up: commanded, and actual, mm/s.
     wanted_mm_s: [f64; 2],
     speed_mm_s: [f64; 2],
     ripple: f64,

@@ -35,15 +35,14 @@ pub enum Fault {
         /// Counts of P_DC per second, of either sign.
         counts_per_s: f64,
     },
-    /// The converter of the static pressure sticks: P_DC says the same from now on, while P_AC lives.
+    /// The converter of the static pressure sticks: P_DC stays the same from now on, while P_AC lives.
     PdcStuck,
-    /// The amplifier of the static pressure loses its gain: P_DC goes back to what it says at rest, while P_AC lives.
+    /// The amplifier of the static pressure loses its gain: P_DC returns to its value at rest, while P_AC lives.
     PdcFades {
         /// Time in which the gain falls to 1/e, s; 0: it is gone at once.
         seconds: f64,
     },
-    /// The amplifier of the static pressure has this gain of a sound one's: P_DC says less than there is, while P_AC
-    /// lives.
+    /// The amplifier of the static pressure has this gain of a sound one's: P_DC reads too low, while P_AC lives.
     PdcWeak {
         /// 0 to 1.
         gain: f64,
@@ -55,7 +54,7 @@ pub enum Fault {
     },
     /// The stage is held by something; its motor can still push.
     StageJammed,
-    /// The stage's bridge is off, whatever its enable says.
+    /// The stage's bridge is off, even when it is enabled.
     BridgeOff,
     /// The stage's bridge is off while its PWM is low, and lets the motor coast.
     FastDecay,
@@ -68,7 +67,7 @@ pub enum Fault {
     EncoderCut(Cut),
     /// The wires of the encoder are exchanged: it counts backwards.
     EncoderSwapped,
-    /// The amplifier of the motor current says so much more than there is.
+    /// The amplifier of the motor current reads this much too high.
     CurrentOffset {
         /// A, of either sign.
         amperes: f64,
@@ -102,13 +101,13 @@ pub enum Fault {
         /// 0 to 1.
         share: f64,
     },
-    /// The lever's driver steps down on its own with 800 steps/s, until its enable is taken away or STEP asked for more
-    /// steps up than it made by itself.
+    /// The lever's driver steps down on its own with 800 steps/s, until its enable is taken away or STEP has commanded
+    /// more steps up than it made by itself.
     LeverRunaway,
     /// The wire of the lever's DIR comes in inverted: up is down.
     LeverDirInverted,
-    /// Somebody presses the emergency stop. One contact is for the firmware to see, and bounces; the other one takes
-    /// the supply of both motors.
+    /// A person presses the emergency stop. The firmware sees one contact, which bounces; the other one takes the
+    /// supply of both motors.
     EStop,
     /// A disturbance on the wire of the stop's first contact.
     EStopGlitch {
@@ -212,7 +211,7 @@ impl Fault {
     }
 }
 
-/// The faults that are there now, as far as they are not the finger's, the lever's, the stage's or the encoder's own.
+/// The present faults, without those of the finger, the lever, the stage and the encoder.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults {
     pub(super) e_stop: Stop,
@@ -302,7 +301,7 @@ impl Switches {
         self.were = now.map(|closed| (closed, 0));
     }
 
-    /// The switches are so at this time.
+    /// Takes the switches at this time.
     pub(super) fn watch(&mut self, now: [bool; 3], at_ns: u64) {
         if self.bounce_ns == 0 {
             return;
@@ -345,7 +344,7 @@ impl Miso {
 
     /// Changes what the sensor puts on the line in answer to a transfer that begins with `mosi`.
     pub(super) fn pass(&mut self, now_ns: u64, mosi: u8, line: &mut [u8], faults: &Faults) {
-        // a read says 00 first, every command something else
+        // a read begins with 00, every command with another byte
         if mosi != 0 {
             self.command = mosi;
         } else if let [byte0, byte1, ..] = line {

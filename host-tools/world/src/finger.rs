@@ -208,8 +208,8 @@ impl Finger {
         }
     }
 
-    /// Feeds the transducers alone, without a contact: for tests of what is behind them. An accelerometer feels as many
-    /// g as the vibration has newtons, without the silicone's resonance.
+    /// Feeds the transducers alone, without a contact: for tests of the chain behind them. An accelerometer feels as
+    /// many g as the vibration has newtons, without the silicone's resonance.
     #[cfg(test)]
     pub(super) fn feed(&mut self, stimulus: &Stimulus) {
         self.signals.tick(stimulus, &mut self.noise);

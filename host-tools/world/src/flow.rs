@@ -158,7 +158,7 @@ impl Flow {
         (self.at_ns, self.x_mm) = (now_ns, x_mm);
     }
 
-    /// Height over what it sees; `None` where it sees nothing.
+    /// Height over the surface; `None` if it sees none.
     fn height_mm(&self) -> Option<f64> {
         let stopped = self.frame_ns.saturating_sub(self.moved_ns) > STOPS_NS;
         match self.ground {
@@ -173,7 +173,7 @@ impl Flow {
         self.spoiled = false;
     }
 
-    /// A byte goes over the bus in mode 3, from and until then: what it answers.
+    /// A byte goes over the bus in mode 3, from and until then; returns its answer.
     pub fn byte(&mut self, begins_ns: u64, ends_ns: u64, mosi: u8) -> u8 {
         if self.unplugged {
             return FLOATING;

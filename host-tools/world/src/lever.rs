@@ -9,7 +9,7 @@
 //! that snaps into another period, always a whole number of them away.
 //!
 //! The screw locks itself: its thread (Tr8x2) rises by 5.2 degrees, and steel on brass holds up to 8.5. Without current
-//! the lever stays where it is, whatever pushes; only its knob moves it.
+//! the lever stays where it is under any force; only its knob moves it.
 
 use std::f64::consts::TAU;
 
@@ -121,7 +121,7 @@ impl Pin {
 #[derive(Clone, Copy, Default, Debug)]
 struct Runaway {
     due: f64,
-    /// its own steps down, and the steps up that were asked for since it began
+    /// its own steps down, and the steps up that were commanded since it began
     down: u64,
     up: u64,
 }
@@ -194,7 +194,7 @@ impl Lever {
                 self.take_step(at_ns, sign, load_n);
             }
         } else if !long_enough {
-            // the driver never saw this pulse: what it did 4 us ago is undone
+            // the driver never saw this pulse: its step of 4 us ago is undone
             self.bad_pulses += 1;
             if self.last_edge_stepped {
                 self.last_edge_stepped = false;
@@ -274,7 +274,7 @@ impl Lever {
         self.held = held;
     }
 
-    /// Steps down that STEP edges asked for and the rotor did not make, less those up.
+    /// Steps down that STEP edges commanded and the rotor did not make, less those up.
     pub fn missing_steps(&self) -> f64 {
         self.asked as f64 - (self.rotor - self.began_at)
     }
@@ -284,7 +284,7 @@ impl Lever {
         self.bad_pulses
     }
 
-    /// From now on DIR says the opposite; `false` ends it.
+    /// Inverts DIR from now on; `false` ends it.
     pub fn invert_dir(&mut self, on: bool) {
         self.inverted = on;
     }
@@ -313,7 +313,7 @@ impl Lever {
     }
 
     /// From now on the driver steps down by itself, [`RUNAWAY_PER_S`], until the current is off or more steps up were
-    /// asked for than it made; `false` ends it.
+    /// commanded than it made; `false` ends it.
     pub fn run_away_down(&mut self, on: bool) {
         self.runaway = on.then(Runaway::default);
     }
@@ -355,7 +355,7 @@ impl Lever {
         }
     }
 
-    /// Loses hold: the rotor goes on to the next place of the same currents.
+    /// Loses hold: the rotor moves to the next place of the same currents.
     fn slip(&mut self, direction: i64, load_n: f64) {
         self.turn((PERIOD * direction) as f64, load_n);
     }

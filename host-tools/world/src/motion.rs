@@ -13,7 +13,7 @@ struct Bus {
     flow: Flow,
     now_ns: u64,
     x_mm: f64,
-    /// Pauses are so many times as long as they should be.
+    /// Factor on the pauses.
     pauses: f64,
 }
 

@@ -75,7 +75,7 @@ impl Peers {
         }
     }
 
-    /// A tick of the world is over: what goes on without the bus.
+    /// A tick of the world is over: advances the parts that run without the bus.
     pub(super) fn tick(&mut self, now_ns: u64, finger: &Finger) {
         if let (
             Self::Mems {
@@ -112,7 +112,7 @@ impl Peers {
         }
     }
 
-    /// A byte to the selected part, and what it says meanwhile.
+    /// A byte to the selected part; returns the part's byte.
     pub(super) fn byte(&mut self, now_ns: u64, mosi: u8, finger: &mut Finger, fraction: f64) -> u8 {
         match self {
             Self::BioTac(sensor) => {

@@ -16,8 +16,8 @@ use super::surface::LENGTH_MM;
 /// Stream of the seed that hands draw from.
 const STREAM: u64 = 0x4a4d;
 
-/// Force that a hand takes to be moved, N s/mm: with the skin's stiffness of about 1 N/mm it follows what it means
-/// within 0.15 s (chosen).
+/// Force that moves a hand, N s/mm: with the skin's stiffness of about 1 N/mm it follows its intention within 0.15 s
+/// (chosen).
 const DRAG_N_S_MM: f64 = 0.15;
 /// Fastest that it lets the finger down and lifts it, mm/s (chosen).
 const APPROACH_MM_S: f64 = 12.0;
@@ -88,7 +88,7 @@ impl Default for Manner {
 pub struct Hand {
     noise: Noise,
     manner: Manner,
-    /// what it means to do
+    /// its intention
     force_n: f64,
     pace_mm_s: f64,
     indentation_mm: f64,

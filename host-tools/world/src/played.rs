@@ -32,9 +32,9 @@ pub struct Played {
 pub struct PlayCounts {
     /// Slides that were begun.
     pub slides: u32,
-    /// P_AC samples that 12 bits do not hold; they were cut to what they hold.
+    /// P_AC samples beyond 12 bits; they were clipped.
     pub clipped: u32,
-    /// P_AC samples that were asked for after a recording had ended; they show the sensor's noise.
+    /// P_AC samples that were read after a recording had ended; they show the sensor's noise.
     pub over: u32,
 }
 

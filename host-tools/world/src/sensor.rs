@@ -28,7 +28,7 @@ const NOTHING_TO_SEND: u8 = 0x5F;
 const PROPERTY: u8 = 0x61;
 /// Command that starts the streaming mode.
 const STREAM: u8 = 0xA1;
-/// MISO with nobody driving it.
+/// MISO while no part drives it.
 const FLOATING: u8 = 0xFF;
 
 /// Longest property, bytes: the serial number.
@@ -147,8 +147,8 @@ impl SensorPeer {
         self.line = [FLOATING; PROPERTY_LEN];
     }
 
-    /// Takes a byte. The first one decides what is on the line: [`SensorPeer::line`]. The sample of a command is taken
-    /// `fraction` of a tick after the last but one.
+    /// Takes a byte. The first one sets the answer: [`SensorPeer::line`]. The sample of a command is taken `fraction`
+    /// of a tick after the last but one.
     pub fn byte(&mut self, mosi: u8, finger: &mut Finger, fraction: f64) {
         self.bytes += 1;
         match self.bytes {
@@ -171,7 +171,7 @@ impl SensorPeer {
         self.ended_ns = now_ns;
     }
 
-    /// One period of chip select as a whole, from `now_ns` on: what comes of `mosi`, and `miso` in answer.
+    /// One period of chip select as a whole, from `now_ns` on: sends `mosi`, and fills `miso` with the answer.
     pub fn transfer(
         &mut self,
         now_ns: u64,

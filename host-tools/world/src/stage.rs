@@ -269,7 +269,7 @@ impl Stage {
         let drag = force_n_per_a * force_n_per_a * braking + VISCOUS_N_S_PER_M;
         let inertia = MASS_KG / TICK_S + drag;
         let free = (MASS_KG / TICK_S * v + push_n) / inertia;
-        // ... which then takes what it can, but turns nothing round
+        // ... which then takes its share, but reverses no motion
         let dry = self.dry_friction_n() / inertia;
         let after = if self.jammed || free.abs() <= dry {
             0.0

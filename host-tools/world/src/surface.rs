@@ -93,7 +93,7 @@ pub struct Surface {
     height: Vec<f32>,
     /// the part of them that the skin follows, um: looked up all the time, so that its length is known while compiling
     followed: Box<[f32; POINTS]>,
-    /// rms of what it does not follow, um
+    /// rms of the part that it does not follow, um
     unresolved_um: f64,
     /// friction relative to the texture's, every [`SLOW_MM`]
     friction: Vec<f64>,
@@ -233,7 +233,8 @@ fn wandering(noise: &mut Noise, deviation: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A random profile with the given relative power density over spatial frequency, told by its wavelength in mm.
+/// A random profile with the given relative power density over spatial frequency, as a function of the wavelength in
+/// mm.
 fn random_profile(noise: &mut Noise, density: impl Fn(f64) -> f64) -> Vec<f64> {
     let length_mm = POINTS as f64 * POINT_MM;
     let (mut re, mut im) = (vec![0.0; POINTS], vec![0.0; POINTS]);

@@ -113,7 +113,7 @@ const GROUP_SPREAD: Spread = Spread {
     wavelength: 0.25,
     movement: 1.0,
 };
-/// Of a texture of which the paper or its name says more (chosen).
+/// Deviations of a texture about which the paper or its name tells more (chosen).
 const HINTED_SPREAD: Spread = Spread {
     friction: 0.08,
     height: 0.15,
@@ -140,7 +140,7 @@ const IMPULSE_SPREAD: f64 = 0.3;
 const IMPULSE_POWERS: (f64, f64) = (0.25, 0.15);
 /// Deviation of a period from the next in cloth (chosen).
 const CLOTH_JITTER: f64 = 0.03;
-/// The same in what is moulded, machined or extruded (chosen).
+/// The same in moulded, machined or extruded textures (chosen).
 const GRATING_JITTER: f64 = 0.001;
 
 /// Draws the parameters of texture `number` in the world `seed`.

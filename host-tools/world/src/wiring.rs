@@ -4,7 +4,8 @@
 /// A mistake in building the rig. Each shows only at the pins.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Miswired {
-    /// The sensor's MISO and MOSI are exchanged: it hears no command, and drives the chip's MOSI while it is selected.
+    /// The sensor's MISO and MOSI are exchanged: it receives no command, and drives the chip's MOSI while it is
+    /// selected.
     DataExchanged,
     /// The sensor's chip select leads nowhere: it is never selected.
     SelectOpen,
@@ -23,7 +24,7 @@ pub enum Miswired {
     EStopKeepsSupply,
     /// The stage's motor is connected the other way round.
     MotorReversed,
-    /// PWM and DIR of the stage's bridge are exchanged: DIR switches it, and PWM says which way.
+    /// PWM and DIR of the stage's bridge are exchanged: DIR switches it, and PWM sets the direction.
     PwmDirExchanged,
     /// The enable of the stage's bridge leads nowhere: the bridge is off.
     BridgeEnableOpen,
@@ -44,7 +45,7 @@ const FLOATING_COUNTS: f64 = 372.0;
 /// Reading of the converter without current, counts.
 const MIDDLE_COUNTS: f64 = 2048.0;
 
-/// The wires of a rig, as far as they are not the lever's or the encoder's own.
+/// The wires of a rig, without those of the lever and the encoder.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wires {
     pub(super) data_exchanged: bool,

@@ -3,10 +3,10 @@
 //! Inputs are levels, duties and bytes with their time in ns; outputs are the levels of the pins at the time reached.
 //! Nothing here knows the intentions of a controller. [`World::truth`] is for tests and displays only.
 //!
-//! Time: [`World::advance_to`] goes on in ticks of 76 us ([`TICKS_PER_S`](super::TICKS_PER_S)). The tick that holds the
-//! time reached is computed as a whole, with the inputs as they were at its begin, so that an input acts within 76 us;
-//! outputs between ticks are interpolated. Times may repeat; a time earlier than the last acts now, though the driver
-//! still measures STEP and DIR by it.
+//! Time: [`World::advance_to`] advances in ticks of 76 us ([`TICKS_PER_S`](super::TICKS_PER_S)). The tick that holds
+//! the time reached is computed as a whole, with the inputs as they were at its begin, so that an input acts within
+//! 76 us; outputs between ticks are interpolated. Times may repeat; a time earlier than the last acts now, though the
+//! driver still measures STEP and DIR by it.
 //!
 //! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
 
@@ -89,7 +89,7 @@ pub struct Truth {
     pub tip_mm: f64,
     /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub indentation_mm: f64,
-    /// Steps down that STEP asked for and the lever did not make, less those up.
+    /// Steps down that STEP commanded and the lever did not make, less those up.
     pub lever_missing_steps: f64,
     /// STEP and DIR edges that broke the driver's timing.
     pub lever_bad_pulses: u64,
@@ -267,7 +267,7 @@ impl World {
         self.supply_motors();
     }
 
-    /// Gives both motors current as their enables say, unless the emergency stop has taken their supply.
+    /// Gives both motors current if they are enabled, unless the emergency stop has taken their supply.
     fn supply_motors(&mut self) {
         let dips = self.now_ns < self.faults.dip_ends_ns;
         let stopped = self.faults.e_stop.cuts_power() && !self.wires.stop_keeps_supply;

@@ -1,4 +1,4 @@
-//! One button: a short press goes on, a long one takes.
+//! One button: a short press moves on, a long one takes.
 
 /// Equal looks that make a level, ticks: contacts bounce for less.
 const STEADY: u8 = 3;

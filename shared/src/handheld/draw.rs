@@ -219,7 +219,7 @@ fn below(name: &str) -> String<40> {
 /// Writes a short text.
 fn say(text: core::fmt::Arguments<'_>) -> String<40> {
     let mut said = String::new();
-    // cut off where it is too long
+    // cut off if it is too long
     let _ = said.write_fmt(text);
     said
 }
@@ -537,7 +537,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// A sentence, and the button goes on.
+    /// A sentence, and the button moves on.
     fn sentence(&mut self, title: &str, text: &str) -> Done<D> {
         self.title(title, "")?;
         self.paragraph(text)?;

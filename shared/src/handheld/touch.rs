@@ -107,7 +107,7 @@ pub struct Touch<'p, K> {
     air: f32,
     /// Mean P_DC of the latest blocks.
     forces: Deque<f32, STEADY_FORCE>,
-    /// Blocks in a row that say down, or up.
+    /// Blocks in a row that are down, or up.
     changes: u8,
     /// Still P_AC that is not yet old enough to be background.
     latest: Deque<[i16; LOOK], DELAY>,

@@ -1,4 +1,4 @@
-//! A finger is calibrated without a computer, asked for on the display: known weights on it set the force, and an
+//! Calibration of a finger without a computer, prompted on the display: known weights on it set the force, and an
 //! accelerometer is turned over.
 
 use embedded_storage_async::nor_flash::NorFlash;

@@ -80,7 +80,7 @@ pub enum ArmState {
     Failed,
 }
 
-/// The order that is open, and when something was said about it.
+/// The open order, and the time of the last message about it.
 #[derive(Clone, Debug)]
 pub(super) struct Orders {
     order: ArmOrder,

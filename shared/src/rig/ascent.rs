@@ -11,7 +11,7 @@ use crate::sensor::FingerModel;
 const AIR_MN: f32 = 460.0;
 /// A driver that steps on its own stops without current; only then the finger is lifted.
 pub(super) const RELEASE_MS: u32 = 20;
-/// P_DC that has risen by so much on the way up, mN, says that something presses: the lever, if it goes down.
+/// Rise of P_DC on the way up, mN, that shows that something presses: the lever, if it goes down.
 const RISEN_MN: f32 = 92.0;
 /// The same of a pressed finger that is lifted, whose stage may still be braking, mN: 20 counts of a BioTac, and 1.26 N
 /// with them are far below the guard's limit, which a lever that goes down at the speed of lifting overshoots by up to
@@ -281,7 +281,7 @@ mod tests {
             }
             seen
         };
-        // 24 counts a minute, for ten minutes; then somebody touches it
+        // 24 counts a minute, for ten minutes; then a person touches it
         assert_eq!(wait(&mut ascent, 600_000, 0.0004, 2600.0), None);
         assert_eq!(wait(&mut ascent, 1_000, 0.0, 2860.0), None);
         // a lever comes down: 45 counts a second

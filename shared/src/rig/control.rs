@@ -275,7 +275,7 @@ impl Control {
                 self.ended = Some(Ended::Stopped);
                 self.enter(Phase::Lifting);
             }
-            // the lever goes on to its limit switch: that is what lifts the finger
+            // the lever continues to its limit switch: that lifts the finger
             Phase::Homing => {
                 self.stage.forget();
                 self.ended = Some(Ended::Stopped);
@@ -285,8 +285,8 @@ impl Control {
         }
     }
 
-    /// Ends the slide that is being made, if one is: the stage brakes as at its end, and what comes after is the same.
-    /// All guards watch on.
+    /// Ends the current slide, if there is one: the stage brakes as at its end, and the rest is the same. All guards
+    /// stay on.
     #[inline]
     pub fn end_slide(&mut self) {
         if self.phase == Phase::Sliding {
@@ -308,7 +308,7 @@ impl Control {
             self.guard.reset();
             self.stage.stop();
             if fault == Fault::LeverNotHome {
-                // it is somewhere else than its steps say, and may be moved by hand now
+                // its place differs from its steps, and it may be moved by hand now
                 self.lever.lose();
             } else {
                 self.lever.reset();
@@ -509,7 +509,7 @@ impl Control {
                     if self.lever.press(target) {
                         self.enter(Phase::Pressing);
                     } else {
-                        // the finger is not lifted, whatever the lever has done: now it will be
+                        // the finger is not lifted after all steps of the lever: now it will be
                         self.fail(Fault::LeverSlips);
                     }
                 }
@@ -576,7 +576,7 @@ impl Control {
             }
             Phase::Lifting => {
                 if self.lever.is_lifted() && libm::fabsf(self.stage.velocity_mm_s()) < STANDS_MM_S {
-                    // steps that were asked for and not made leave the finger down
+                    // steps that were commanded and not made leave the finger down
                     if self.meter.counts() > self.finger.counts(LIFTED_MN) {
                         self.check(Fault::LeverSlips);
                     } else if self.stage.state() == StageState::Unknown {

@@ -53,7 +53,8 @@ macro_rules! faults {
     };
 }
 
-// the fault, its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
+// the fault, its name, its detection, the deadline in ms, the outputs that stop, the commands that are refused, the
+// remedy
 faults! {
     /// The finger is pressed too hard.
     ForceHigh, "force too high",

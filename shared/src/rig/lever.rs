@@ -32,10 +32,10 @@ const TRIM_STEPS_S: i32 = 200;
 /// Between trials the finger hangs this far above the last contact: 1 mm. It is pressed on no further below that than
 /// this while P_DC shows no contact: that is 1 N on a hard sample.
 const CLEARANCE_STEPS: i32 = 1600;
-/// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Where nothing was touched
-/// by then, there is no sample.
+/// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Without contact by then,
+/// there is no sample.
 pub const MAX_STEPS: i32 = 25_600;
-/// A finger that presses on something thin goes on to the lower end itself: 17 mm below the limit switch.
+/// A finger that presses on something thin continues to the lower end itself: 17 mm below the limit switch.
 const END_STEPS: i32 = 27_200;
 /// Contact is seen when the mean of P_DC has risen by this, mN: 3 counts of a BioTac, thirty times its noise.
 const CONTACT_MN: f32 = 34.5;
@@ -120,7 +120,7 @@ pub enum LeverState {
     Settling,
     /// Pressed; the last correction is being stepped, to this count.
     Trimming(i32),
-    /// Pressed with the force that was asked for. The motor stands, whatever the force does.
+    /// Pressed with the target force. The motor stands, at any change of the force.
     Holding,
     /// Up, to this count of steps.
     Retracting(i32),
@@ -131,7 +131,7 @@ pub enum LeverState {
 pub struct Lever {
     finger: &'static FingerModel,
     state: LeverState,
-    /// Force asked for, in counts above no contact.
+    /// Target force, in counts above no contact.
     target: f32,
     trims: u8,
     /// Number of stops on the way, the first mean of P_DC there, and P_DC summed up since contact, counts times s.
@@ -246,8 +246,8 @@ impl Lever {
         self.enter(LeverState::Homing);
     }
 
-    /// Brings a finger that hangs over the sample up to the limit switch, which shows whether it stays lifted, whatever
-    /// the sensor does. Returns true if the way begins.
+    /// Brings a finger that hangs over the sample up to the limit switch, which shows whether it stays lifted,
+    /// independent of the sensor. Returns true if the way begins.
     pub fn park(&mut self) -> bool {
         let hangs = self.is_lifted() && !self.at_switch;
         if hangs {
@@ -313,7 +313,7 @@ impl Lever {
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
             LeverState::Homing | LeverState::Parking => {
-                // Lower than it was, the lever goes on: if the switch is stuck, that is right; if steps were lost, it
+                // Lower than it was, the lever continues: if the switch is stuck, that is right; if steps were lost, it
                 // stands at its hard stop until the count is right again. Higher, and steps up were lost: there the top
                 // is now.
                 if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {

@@ -30,7 +30,7 @@ const AIR_MS: u32 = 2000;
 /// Largest P_DC above its zero that a lifted finger shows, mN.
 const LIFTED_MN: f32 = 92.0;
 /// Excess over a movement's force that is a fault: a share of it, and mN. With 1.26 N that is 1.66 N: an arm that comes
-/// down three times as fast as it was asked to stays below 2.2 N then, see `tests/core/arm.rs`.
+/// down at three times its speed limit stays below 2.2 N then, see `tests/core/arm.rs`.
 const TOO_HARD: (f32, f32) = (1.2, 150.0);
 /// Force that is a fault while the finger is lifted or on its way, mN.
 const IN_AIR_MN: f32 = 500.0;
@@ -390,7 +390,7 @@ impl RigOverLink {
             .guard
             .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn)?;
         match (self.phase, fault) {
-            // before P_DC in the air is known, its height says nothing
+            // before P_DC in the air is known, its height is meaningless
             (_, Fault::ForceHigh) if !self.knows_air() => None,
             (Phase::Faulted(Fault::ArmRuns), _) => None,
             // a stop was ordered, and the arm does not obey

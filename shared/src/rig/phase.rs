@@ -100,7 +100,7 @@ pub enum RigError {
     /// The movement did not end by itself, and was stopped: see [`super::timeout`].
     #[error("the movement does not end: home the rig")]
     Hangs,
-    /// Nobody made the movement by hand in time.
+    /// The movement was not made by hand in time.
     #[error("no touch for a minute: ask again")]
     NobodyThere,
     /// A hand does not make this movement.

@@ -54,7 +54,7 @@ impl StageConstants {
 }
 
 /// Largest distance between profile and stage that is still following: so many mm, and the way of so many s. Long
-/// enough for the guard to say why the stage stands.
+/// enough for the guard to find why the stage stands.
 const FOLLOWING_MM: f32 = 1.0;
 const FOLLOWING_S: f32 = 0.04;
 /// Velocity is taken over this many ms of encoder counts.
@@ -129,7 +129,7 @@ impl Profile {
         }
     }
 
-    /// Ends it as soon as its ramp allows: from now on the ramp down. One that is on its ramp down goes on.
+    /// Ends it as soon as its ramp allows: from now on the ramp down. One that is on its ramp down continues.
     fn brake(&mut self) {
         let t = self.ms as f32 * 1e-3;
         // on the ramp up it has not reached its speed yet
@@ -246,8 +246,8 @@ impl Stage {
         self.searched
     }
 
-    /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile says how
-    /// long it takes.
+    /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile gives the
+    /// time.
     #[inline]
     pub fn go(&mut self, to_mm: f32, speed_mm_s: f32) -> Option<Profile> {
         if self.state != StageState::Standing {
@@ -267,7 +267,7 @@ impl Stage {
         self.searched = false;
     }
 
-    /// The motor goes off, whatever it was doing.
+    /// The motor goes off, from any state.
     pub fn stop(&mut self) {
         if self.searched || matches!(self.state, StageState::Unknown | StageState::Homing(_)) {
             self.forget();
@@ -329,7 +329,7 @@ impl Stage {
             }
             self.state = StageState::Moving(profile);
         }
-        // the velocity lags by half of what it is taken over
+        // the velocity lags by half of its averaging time
         let lag_s = VELOCITY_MS as f32 * 0.5e-3;
         let v_then = if t < lag_s {
             0.0
@@ -401,7 +401,7 @@ mod tests {
                     (x_then - x).abs() < 1e-3 && (v_then - v).abs() < 1e-2,
                     "{ms}"
                 );
-                // what was braking already goes on
+                // a stage that was braking already continues
                 let slows = a * v < 0.0;
                 let way = v * v / 2000.0 * v.signum();
                 let stands = profile.at(1e3).0;

@@ -38,8 +38,8 @@ impl UnloadedRuns {
     /// `calibration` with the current that was measured.
     ///
     /// # Errors
-    /// [`RigCalibrationError::Points`] also before all runs are made; [`RigCalibrationError::NoLine`], and what
-    /// [`RigCalibration::check`] says.
+    /// [`RigCalibrationError::Points`] also before all runs are made; [`RigCalibrationError::NoLine`], and the errors
+    /// of [`RigCalibration::check`].
     #[inline]
     pub fn finish(
         &self,

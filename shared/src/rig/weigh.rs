@@ -6,8 +6,7 @@ pub const LOOKS_HZ: u32 = 100;
 const STILL: u32 = 3 * LOOKS_HZ / 2;
 /// Counts that P_DC may wander meanwhile, and the share of it.
 const WANDERS: (f32, f32) = (2.0, 0.04);
-/// A weight is there from this share of what it should give by the constants so far: a fingertip's are off by half at
-/// most.
+/// Share of its expected counts from which a weight is there: a fingertip's constants are off by half at most.
 const THERE: f32 = 0.4;
 /// Remainder at which a weight counts as taken away, mN: half of the least weight, and far below the rise that a rig's
 /// guard takes for a press on a finger that waits.
@@ -194,7 +193,7 @@ mod tests {
         assert!((10.0..20.0).contains(&scale.off_mn), "{scale:?}");
         // 3 g of 30 are a scale's error, and no wrong weight
         assert!(of([31.9, 58.8, 88.3, 117.7, 147.1]).is_some());
-        // the third was laid on twice; the fourth is a third heavier than it says
+        // the third was laid on twice; the fourth is a third heavier than its label
         assert_eq!(of([29.4, 58.8, 88.3, 88.3, 147.1]), None);
         assert_eq!(of([29.4, 58.8, 88.3, 157.0, 147.1]), None);
         assert_eq!(of([-29.4, -58.8, -88.3, -117.7, -147.1]), None);

@@ -127,7 +127,7 @@ impl Mcu for Part {
         self.encoder.tap.lines = (false, false);
     }
 
-    /// Only USART3 has somebody outside. rigless' own poll asks all eight ports at every stop.
+    /// Only USART3 has a peer outside. rigless' own poll asks all eight ports at every stop.
     fn poll(&mut self, now: VirtualNanos) {
         self.f427
             .drive_serial_port(now, USART3, |port, registers, context| {

@@ -33,7 +33,7 @@ pub struct Display {
     wired: bool,
     plugged: bool,
     next: Next,
-    /// a command with what has come of its parameters
+    /// a command with its parameters so far
     command: Vec<u8>,
     ram: [u8; WIDTH * HEIGHT / 8],
     on: bool,
@@ -325,7 +325,7 @@ mod tests {
         send(&mut display, &[&[0x40], &text.bytes()[500..]].concat());
         assert!(display.picture() == Some(text));
         assert_eq!(display.written_ns(), Some(0));
-        // the same again is nothing new, and half a picture is none
+        // the same picture again is not new, and half a picture is not whole
         let again = [&[0x40], &write("Tactus", &FONT_7X13_BOLD).bytes()[..]].concat();
         send_at(&mut display, 5, &again);
         send_at(&mut display, 6, &[0x40; 500]);
@@ -345,7 +345,7 @@ mod tests {
             ..display.clone()
         };
         assert!(other.shows("lost 0") && !other.shows("lost 8") && !other.shows("lost 0 "));
-        // turned round, nobody reads it; inverted, everybody
+        // turned round, it cannot be read; inverted, it can
         send(&mut display, &[0x80, 0xA0, 0x80, 0xA7]);
         assert!(!display.shows("Tactus"));
         send(&mut display, &[0x00, 0xA1]);

@@ -276,7 +276,7 @@ impl Emulator {
     fn unmapped(&mut self) -> Result<Vec<u64>, Error> {
         self.with(|standing| {
             let unmapped = standing.session.unmapped().into_iter();
-            // stores to the array are listed, since the driver does what they do
+            // stores to the array are listed, since the driver programs it
             unmapped
                 .map(|access| access.address)
                 .filter(|address| !flash::ARRAY.contains(address))

@@ -38,7 +38,7 @@ pub(super) struct Halt {
 }
 
 impl Halt {
-    /// The core stands from now on. With `watchdog_stands` the tool has told DBGMCU to stop the watchdog.
+    /// The core stands from now on. With `watchdog_stands` the tool has set DBGMCU to stop the watchdog.
     pub(super) fn begin(part: &mut Part, at: VirtualNanos, watchdog_stands: bool) -> Self {
         let bits = |part: &Part, register| {
             let registers = part.bus().registers("DBG");
@@ -71,7 +71,7 @@ impl Halt {
         }
     }
 
-    /// The core goes on.
+    /// The core continues.
     pub(super) fn end(self, part: &mut Part, at: VirtualNanos) {
         for cr1 in self.standing {
             let now = part.read(at, cr1, Width::W32).unwrap_or_default();

@@ -79,8 +79,7 @@ impl<T> Handlers<T> {
         });
     }
 
-    /// The latest handler that is over at a hit, until there is none: its frame is gone, or another one begins upon the
-    /// same.
+    /// The latest handler that is over at a hit, or `None`: its frame is gone, or another one begins upon the same.
     pub(super) fn ended(&mut self, hit: &Hit, sp: u32, host: &mut dyn Host) -> Option<Running<T>> {
         let begins = self.begun(hit).is_some();
         let ended = self.running.pop_if(|running| {

@@ -22,7 +22,7 @@ pub struct MotionPeer {
 }
 
 impl MotionPeer {
-    /// It has got its power, over this ground; without a ground there is none.
+    /// It has got its power, over this ground; without a ground there is no sensor.
     pub(crate) fn new(seed: u64, ground: Option<Ground>) -> Self {
         Self {
             flow: ground.map(|ground| Flow::new(seed, ground)),

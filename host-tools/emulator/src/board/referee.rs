@@ -573,7 +573,7 @@ impl Referee {
         }
     }
 
-    /// A store to the flash array, with CR and SR of the flash, before it is made; `old` is what is there.
+    /// A store to the flash array, with CR and SR of the flash, before it is made; `old` is the word there.
     pub(crate) fn programs(&mut self, access: &Access, cr: u64, old: u64) {
         let Some(now) = Now::of(access) else { return };
         let (mask, sector) = (access.width.mask(), access.address & !0x3FFF);

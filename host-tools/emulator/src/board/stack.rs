@@ -141,7 +141,7 @@ pub(crate) struct Stack {
     bottom: u32,
     top: u32,
     found: StackUse,
-    /// with what was below each, the lowest word first
+    /// with the stack below each, the lowest word first
     handlers: Handlers<Vec<u32>>,
 }
 
@@ -187,7 +187,7 @@ impl Stack {
         }
     }
 
-    /// Paints what is below the stack pointer, and gives what was there.
+    /// Paints the stack below the stack pointer, and returns its old contents.
     fn put_aside(&self, level: usize, sp: u32, host: &mut dyn Host) -> Vec<u32> {
         let from = sp
             .saturating_sub(self.found.levels[level].window)

@@ -77,7 +77,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Writes the result as it is wanted.
+    /// Writes the result in its format.
     pub fn write(
         &self,
         text: impl FnOnce() -> String,

@@ -91,8 +91,8 @@ impl Person {
         self.slides
     }
 
-    /// Takes a report of the probe to its host: the weight to put on the finger, if it is none that a person has at
-    /// hand.
+    /// Takes a report of the probe to its host: the weight to put on the finger, if it is one that a person does not
+    /// have at hand.
     pub fn hear(&mut self, report: &Report) {
         if let Event::Prompt(prompt) = report.event {
             self.weight = match prompt {
@@ -150,7 +150,7 @@ impl Person {
             at => (at, None),
         };
         self.at = at;
-        // as long as the display says nothing else, it stays as it is
+        // while the display shows the same, the probe is not turned back
         let turned = turned.or((at == At::Pressing).then_some(false));
         if let Some(over) = turned
             && let Some(hand) = board.rig().world().hand()

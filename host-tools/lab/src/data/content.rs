@@ -42,7 +42,7 @@ pub enum ContentError {
         "{0} fields where the header has {1}: cut off or damaged; fetch or write the file again"
     )]
     Fields(usize, usize),
-    /// A field is not what it should be.
+    /// A field has the wrong form.
     #[error("{0:?} is not {1}")]
     NotA(String, &'static str),
     /// A number is not finite.
@@ -142,7 +142,7 @@ pub enum ContentError {
     /// The file does not unpack.
     #[error("no whole gzip stream ({0}); fetch it again")]
     Gzip(io::Error),
-    /// The file unpacks to other than the manifest says: bytes found (of too many, one more than wanted) and wanted.
+    /// The file does not unpack to the manifest's length: bytes found (of too many, one more than wanted) and wanted.
     #[error(
         "unpacks to {0} {more}bytes{odd}; the manifest says {1}",
         more = if .0 > .1 { "or more " } else { "" },
@@ -196,7 +196,7 @@ pub enum ContentError {
     LongPacked(u64, u64),
 
     // the publisher's files
-    /// Time does not go on.
+    /// Time does not advance.
     #[error("not after the row before; fetch the file again")]
     NotAfter,
     /// Time goes back.
@@ -230,7 +230,7 @@ pub enum ContentError {
     /// The force ends too early.
     #[error("ends before the finger has come to the end of its way; fetch it again")]
     NoForceThen,
-    /// A slide that came of a publisher's file is not usable.
+    /// A slide from a publisher's file is not usable.
     #[error("{0}; fetch the file again, or move it and its _cw away")]
     Imported(Box<Self>),
 

@@ -54,8 +54,8 @@ pub struct Imported {
     pub lost_rows: usize,
 }
 
-/// Converts the recordings in the folder `from` to the project's own format in the folder `to`, where an import that
-/// was interrupted goes on. `progress` is called with the number of slides done, and of slides in all.
+/// Converts the recordings in the folder `from` to the project's own format in the folder `to`; an interrupted import
+/// continues. `progress` is called with the number of slides done, and of slides in all.
 ///
 /// # Errors
 /// If there are no recordings in `from`, a file is damaged, or `to` already holds recordings or cannot be written.
@@ -176,7 +176,7 @@ fn names(folder: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// A writer that goes on with an import of this folder.
+/// A writer that continues an import of this folder.
 fn begin(command: &str, from: &Path, to: &Path, textures: Vec<Texture>) -> Result<RecordingWriter> {
     let from = fs::canonicalize(from).unwrap_or_else(|_| from.to_owned());
     let command = format!("tactus {command} {} ...", from.display());

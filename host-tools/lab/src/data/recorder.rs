@@ -1,8 +1,8 @@
 //! Slides of a real finger in the project's format, from the raw samples that the probe streams while it explores.
 //!
-//! The probe is asked for an exploration that takes one movement after the other and is never sure. P_AC and shear are
-//! the very samples that went into its features, and so is P_DC of a handheld. A rig does not stream P_DC: it is
-//! computed back from the contact force, which the rig reports 20 times a second.
+//! The probe gets a request for an exploration that takes one movement after the other and is never sure. P_AC and
+//! shear are the very samples of its features, and so is P_DC of a handheld. A rig does not stream P_DC: it is computed
+//! back from the contact force, which the rig reports 20 times a second.
 
 use crate::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_core::explorer::Strategy;
@@ -99,7 +99,7 @@ impl Recorder {
             Event::Live(Live { force_mn, .. }) if slide.sliding => {
                 slide.forces.push((report.at_ms, *force_mn));
             }
-            // a force reported while the finger is lifted is none of the slide's
+            // a force reported while the finger is lifted does not belong to the slide
             Event::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
             Event::Block(block) => {
                 if block.number == 0 {

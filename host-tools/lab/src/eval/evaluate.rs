@@ -143,7 +143,7 @@ impl<'b> Shared<'b> {
     }
 }
 
-/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them where they are asked for.
+/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them at each use.
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
@@ -221,7 +221,7 @@ pub(super) fn play_looking<const N: usize>(
 }
 
 /// Plays `runs` runs on all cores; `done` is called after each. The outcomes are in the order of the runs, and the same
-/// whatever the number of threads.
+/// for any number of threads.
 ///
 /// # Errors
 /// See [`EvaluateError`].

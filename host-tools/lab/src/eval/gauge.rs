@@ -43,7 +43,7 @@ pub struct Study {
     pub sd: Deviations,
     /// Share of [`Deviations::gauge`] in [`Deviations::total`]; 0 where nothing differs.
     pub gauge_share: f64,
-    /// Classes of parts that can be told apart, 1.41 times part by gauge; `None`: the gauge is exact.
+    /// Classes of parts that the gauge separates, 1.41 times part by gauge; `None`: the gauge is exact.
     pub distinct_categories: Option<u32>,
     /// Largest distance of a reading from the mean of its part and operator: three standard deviations, by the mean
     /// moving range.

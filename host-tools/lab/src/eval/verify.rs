@@ -101,7 +101,7 @@ pub fn verify(
 ) -> Result<Verified, VerifyError> {
     let experiment = experiment.clone().each_slide_once();
     let config = Config {
-        // nothing is to be told apart: every movement takes its turn
+        // there is nothing to choose: every movement takes its turn
         strategy: Strategy::Cycling,
         open: true,
         ..config

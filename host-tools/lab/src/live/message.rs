@@ -199,7 +199,7 @@ pub enum Happening {
         /// Its place among the textures at this movement.
         place: Option<(f64, f64)>,
     },
-    /// A slide that was asked for by hand was made.
+    /// A slide by a direct request was made.
     Moved {
         /// Of the movement, where the table has it.
         movement: Option<u8>,
@@ -238,14 +238,14 @@ pub enum Happening {
         slide: u32,
         /// `same`, `different` or `unsure`.
         answer: &'static str,
-        /// That in words.
+        /// The answer in words.
         said: String,
     },
     /// A verification is over.
     Verified {
         /// `same`, `different` or `unsure`.
         answer: &'static str,
-        /// That in words, and what it is worth.
+        /// The answer in words, and its error rates.
         said: String,
     },
     /// A slide of recordings.

@@ -357,7 +357,7 @@ mod tests {
                 let (good, _) = slides(world.setup(texture, seed), LEVEL, 1).unwrap();
                 good.first().unwrap().pace
             };
-            // 3 %: what has not come up to speed, frames, counts
+            // 3 %: the part before full speed, frames, counts
             let measured = pace(burlap).unwrap();
             assert!(measured.abs() < 31, "{seed}: {measured}");
             assert_eq!(pace(glass), None, "{seed}");

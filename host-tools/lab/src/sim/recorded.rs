@@ -36,7 +36,7 @@ pub enum PlayError {
         /// Number of the slide.
         number: u32,
     },
-    /// Slides of other movements cannot be told apart while they are played.
+    /// Slides of other movements look the same while they are played.
     #[error("the recordings are of {}; play those of one movement", count(*.0 as u64, "movement"))]
     Movements(usize),
     /// No slide is left to learn from or to test with.

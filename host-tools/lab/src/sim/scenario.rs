@@ -14,14 +14,14 @@ use tactus_world::world::Setup;
 
 /// Longest wait of a step, s, unless it gives another.
 pub const TIMEOUT_S: f64 = 8.0;
-/// Limits of what is accepted: bytes of a file, steps, and virtual seconds that they may take.
+/// Limits of a scenario: bytes of a file, steps, and virtual seconds that they may take.
 const MAX_BYTES: u64 = 256 << 10;
 const MAX_STEPS: usize = 1000;
 const MAX_S: f64 = 3600.0;
 /// A finger is not pressed harder, N, or moved faster, mm/s.
 const MAX_FORCE_N: f64 = 10.0;
 const MAX_PACE_MM_S: f64 = 500.0;
-/// Deviations of a hand are no larger than what they deviate from.
+/// Largest relative deviation of a hand.
 const MAX_DEVIATION: f64 = 1.0;
 const MAX_TILT_MM: f64 = 10.0;
 /// Seeds have room for trials behind them.
@@ -326,7 +326,7 @@ impl Scenario {
 /// Number of a texture of Table 1.
 ///
 /// # Errors
-/// There is none.
+/// There is no such texture.
 pub fn texture(name: &str) -> Result<u8, InvalidScenario> {
     texture_number(name).ok_or_else(|| InvalidScenario::Texture(name.into()))
 }
@@ -426,7 +426,7 @@ impl Step {
         }
     }
 
-    /// From what is seen to what is done, ms.
+    /// Time from a view to the reaction, ms.
     pub const REACTION_MS: u64 = 300;
     /// Default duration of a slide of [`Step::Explore`], and longest wait for its verdict, s.
     pub const EXPLORED_S: f64 = 1.8;

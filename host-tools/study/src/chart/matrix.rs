@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::svg::{DrawError, Figure, WIDTH, figure};
 use super::{Chart, Series};
 
-/// Lower ends of the shades of a [`matrix`]: what is less is white.
+/// Lower ends of the shades of a [`matrix`]: lower degrees are white.
 pub(crate) const SHADES: [f32; 5] = [0.05, 0.2, 0.4, 0.6, 0.8];
 
 /// A symmetric matrix of degrees from 0 to 1 as an image, `title` above it: black is 1. `told` is for those who cannot

@@ -46,7 +46,7 @@ pub enum FabricError {
         /// The fault, and its remedy.
         cause: ContentError,
     },
-    /// A file cannot be read or is not what its manifest says.
+    /// A file cannot be read or differs from its manifest.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }

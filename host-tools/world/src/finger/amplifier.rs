@@ -13,7 +13,7 @@ pub const PAC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 2.16;
 pub const PDC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 21.8 * 1000.0;
 /// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
 pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
-/// Noise of P_AC, Pa rms (PAPER: 1.2 mV; it says 0.52 Pa).
+/// Noise of P_AC, Pa rms (PAPER: 1.2 mV, given there as 0.52 Pa).
 pub const PAC_NOISE_PA: f64 = 0.52;
 /// Noise of P_AC in recordings of real devices, counts rms (OUT: 4.5 to 5.1).
 pub const PAC_NOISE_FIELD_COUNTS: f64 = 4.8;
@@ -37,7 +37,7 @@ const WARM_S: f64 = 60.0;
 /// Ticks from one step of the drift to the next: 10 ms.
 const DRIFT_TICKS: u32 = TICKS_PER_S / 100;
 
-/// The amplifiers and what they remember.
+/// The amplifiers and their state.
 pub(in super::super) struct Amplifiers {
     pac_rest: f64,
     pac_noise_pa: f64,
@@ -46,7 +46,7 @@ pub(in super::super) struct Amplifiers {
     air: f64,
     warm: f64,
     drift_in: u32,
-    /// gain of P_DC relative to a sound amplifier's, and what is left of it after a tick (faults)
+    /// gain of P_DC relative to a sound amplifier's, and its factor per tick (faults)
     pdc_gain: f64,
     pdc_kept: f64,
     high_pass: HighPass,

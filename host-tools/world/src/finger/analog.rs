@@ -1,6 +1,6 @@
 //! A piezo disc behind the skin with two amplifiers, and a load cell with one, as voltages before a converter.
 //!
-//! A disc gives charge for a change of force; with the amplifier's input that is a high-pass. It says more when it is
+//! A disc gives charge for a change of force; with the amplifier's input that is a high-pass. It gives more when it is
 //! loaded, since the skin then covers more of it, and its charge drifts with warmth (pyroelectricity), which the
 //! high-pass takes away.
 

@@ -1,7 +1,7 @@
 //! An accelerometer that floats in silicone behind the skin, and a load cell.
 //!
-//! The accelerometer's board is a mass on the silicone between it and the core. Of the force on the skin a share goes
-//! through it; the rest goes round it. Its resonance and the silicone's losses shape what it feels.
+//! The accelerometer's board is a mass on the silicone between it and the core. Of the force on the skin a share passes
+//! through it; the rest goes round it. Its resonance and the silicone's losses shape its acceleration.
 
 use std::f64::consts::TAU;
 
@@ -59,7 +59,7 @@ impl Mems {
         self.acceleration_g = stimulus.held.down + (pushed + core) / G;
     }
 
-    /// It feels this, g, whatever its silicone does.
+    /// Sets its acceleration, g, at any state of its silicone.
     #[cfg(test)]
     pub(super) fn feed(&mut self, g: f64) {
         self.acceleration_g = g;

@@ -1,8 +1,8 @@
 //! The vibrations that sliding over a surface makes, and their way through the fluid.
 //!
 //! Three sources. The ridges follow the surface up and down: a spatial filter over the contact patch, which gives lines
-//! at v/lambda (eq. 17) and tells coarse from fine. Asperities too fine to be followed catch and release: impulses,
-//! more of them the faster it goes, that excite the resonance of the fluid whatever the speed. And friction itself
+//! at v/lambda (eq. 17) and distinguishes coarse from fine. Asperities too fine to be followed catch and release:
+//! impulses, more of them the faster it goes, that excite the resonance of the fluid at any speed. And friction itself
 //! fluctuates, with a 1/f spectrum, in proportion to the shear (PAPER after Wiertlewski 2011).
 
 use std::f64::consts::TAU;

@@ -37,7 +37,7 @@ pub struct Ads1220 {
     clock: f64,
     ready_ns: u64,
     wire_cut: bool,
-    /// A conversion under way: when it began and ends; what it has summed up, and the time of that.
+    /// A conversion under way: its begin and end; its sum so far, and the time of that.
     converts: Option<(u64, u64)>,
     sum: (f64, f64),
     tick_ns: u64,
@@ -147,7 +147,7 @@ impl Ads1220 {
         let reference = match self.registers[2] >> 6 {
             3 => SUPPLY_V,
             0 => INTERNAL_V,
-            // nothing is wired to REFP and REFN: it says its end (chosen)
+            // nothing is wired to REFP and REFN: it reads full scale (chosen)
             _ => return FULL as i32,
         };
         // AIN0 - AIN1 is where the cell is; of the others nothing is known here

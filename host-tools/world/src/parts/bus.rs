@@ -1,6 +1,6 @@
 //! The bus as a part has it.
 
-/// MISO with nobody driving it, by its pull-up.
+/// MISO while no part drives it, by its pull-up.
 pub(super) const FLOATING: u8 = 0xFF;
 
 /// Polarity and phase of the clock, as the bus's master has them.

@@ -10,20 +10,20 @@ pub enum PartFault {
     CellBrownOut,
     /// A signal wire of the cell is broken: the input goes to an end of its range.
     CellWire,
-    /// Signal wires of the cell are exchanged: it says less when it is pressed.
+    /// Signal wires of the cell are exchanged: it reads less when it is pressed.
     CellReversed,
     /// The plug of all parts is out.
     Unplugged,
     /// That of the accelerometer is.
     AccelerometerUnplugged,
-    /// Something blocks the cell: it says the same, pressed or not.
+    /// Something blocks the cell: it reads the same, pressed or not.
     CellBlocked,
     /// The clocks of accelerometer and converter are off by this share.
     ClocksOff {
         /// Of either sign.
         share: f64,
     },
-    /// The accelerometer says this share more than the data sheet has it, and this much where it should say 0.
+    /// The accelerometer reads this share above the data sheet's scale, and this much at 0.
     AccelerometerOff {
         /// Of either sign.
         share: f64,

@@ -52,7 +52,7 @@ pub struct Iis3dwb {
     noise: Noise,
     /// Share that its clock is off by.
     clock: f64,
-    /// Share that its scale is off by, and what it says at 0, g: pieces differ (how far could not be read in DS12569).
+    /// Error of its scale, as a share, and its reading at 0, g: pieces differ (how far could not be read in DS12569).
     scale: (f64, f64),
     powered_ns: u64,
     on_since_ns: Option<u64>,
@@ -68,7 +68,7 @@ pub struct Iis3dwb {
     /// Of this select: bits come late, the address once it is known, and whether it is written.
     heard: bool,
     address: Option<(u8, bool)>,
-    /// Writes to bits that have to stay as they are.
+    /// Writes to bits that must not change.
     complaints: u64,
 }
 

@@ -58,7 +58,7 @@ impl Mcp3202 {
         })
     }
 
-    /// A clock: DIN is taken while it rises; what is on DOUT then was put there as it fell before.
+    /// A clock: DIN is taken while it rises; the level of DOUT then was set as it fell before.
     fn bit(&mut self, din: bool, sample: &mut impl FnMut(u8) -> u16) -> bool {
         match self.state {
             State::Waits => {

@@ -343,7 +343,8 @@ fn fast_decay_coasts_where_slow_decay_brakes() {
     assert_eq!(stage.position_mm(), 40.0);
 }
 
-/// As often as the screw's turns and the commutation come past, as far as was said, and not at all at rest.
+/// The vibration has the periods of the screw's turns and of the commutation, the commanded amplitude, and is 0 at
+/// rest.
 #[test]
 fn a_vibration_has_its_amplitude_and_its_frequencies() {
     let mut stage = plain();

@@ -46,7 +46,7 @@ impl Hum {
     }
 }
 
-/// A slide as it was sampled and as it was.
+/// A slide as it was sampled, and its ground truth.
 pub(super) struct Slide {
     /// P_AC in counts while pressed and still, and while sliding
     pub(super) background: Vec<f64>,
@@ -133,7 +133,7 @@ impl Slide {
     pub(super) fn properties(&self) -> Properties {
         let spectrum = spectrum(&self.pac);
         let background = band(&self::spectrum(&self.background), 20.0, 700.0);
-        // what is left of noise by chance counts as a hundredth of the noise
+        // the rest of noise by chance counts as a hundredth of the noise
         let power = (band(&spectrum, 20.0, 700.0) - background).max(0.01 * background);
         Properties {
             traction: self.shear_n,

@@ -120,7 +120,7 @@ fn ten_textures_are_as_the_paper_describes_them() {
         assert!(rank(traction, 46) <= 2 && rank(traction, 47) <= 2);
         // polished aluminum is the least rough, rubber smooth
         assert!(rank(roughness, 46) >= 8 && rank(roughness, 47) >= 7);
-        // graphite and satin have higher centroids than burlap and velcro, and than what has no features
+        // graphite and satin have higher centroids than burlap and velcro, and than textures without features
         for fine in [43, 84] {
             assert!(
                 [10, 100, 46, 47]

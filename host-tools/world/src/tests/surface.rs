@@ -173,7 +173,7 @@ fn gratings_give_lines_at_v_over_lambda_and_its_harmonics() {
         wavelength_mm: 1.3,
         ..texture.weave.unwrap()
     });
-    // load and speed do what they do on an ordinary texture
+    // the laws of load and speed are those of an ordinary texture
     (texture.vibration_speed, texture.vibration_bend) = (0.0, 0.0);
     (texture.impulse_load, texture.impulse_bend) = (0.0, 0.0);
     texture.clamped_n = 0.6;

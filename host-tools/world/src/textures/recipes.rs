@@ -1,4 +1,4 @@
-//! Median parameters of the textures: of each group, and of single textures about which the paper or the name says
+//! Median parameters of the textures: of each group, and of single textures about which the paper or the name tells
 //! more.
 //!
 //! All are chosen. Heights are rms in um, lengths in mm.
@@ -83,7 +83,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         11 => Recipe { friction: 0.50, relief: (40.0, 0.8), ..r },
         17 => Recipe { friction: 0.90, fine: (1.5, 0.08), relief: (8.0, 0.8), ..r },
         18 | 19 => Recipe { friction: 0.75, fine: (0.4, 0.05), relief: (1.5, 1.0), ..r },
-        // the grating its name says
+        // the grating in its name
         20 => Recipe { friction: 0.50, fine: (0.8, 0.06), relief: (4.0, 1.0), weave: (40.0, 5.0), grating: true, ..r },
         21 => Recipe { friction: 0.70, fine: (1.0, 0.06), relief: (5.0, 1.0), weave: (12.0, 1.5), grating: true, ..r },
         22 => Recipe { relief: (25.0, 2.0), ..r },

@@ -103,7 +103,7 @@ impl Bench {
         (0..100).map(|_| self.counts(PDC)).sum::<f64>() / 100.0
     }
 
-    /// Adds to its hash what all pins say in one slot.
+    /// Adds the levels of all pins in one slot to its hash.
     fn hash_slot(&mut self, command: u8, hash: &mut DefaultHasher) {
         hash.write(&self.sample(command));
         hash.write_i32(self.world.encoder());

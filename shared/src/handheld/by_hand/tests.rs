@@ -210,7 +210,7 @@ fn a_person_makes_the_slide_that_is_asked_for_and_its_samples_are_the_hosts() {
     let expected = [Prompt::Lift, Prompt::Press, Prompt::Slide, Prompt::Lift];
     assert_eq!(prompts(&rig), expected);
     assert_eq!(rig.hand.shown, ["Press", "Slide", "Lift"]);
-    // the same slide, from what was streamed
+    // the same slide, from the streamed samples
     let mut streamed = Slide::<Plain>::new(&plan, MOVEMENT);
     let (mut pdc, mut steady) = (List::new(), 0..0);
     for event in &rig.hand.told {

@@ -153,7 +153,7 @@ impl<'p> Bench<'p> {
         self.probe.judgement.as_ref().unwrap()
     }
 
-    /// The first words of what is shown.
+    /// The first words of the screen.
     fn shown(&self) -> std::string::String {
         let table = Table::read(&self.table).unwrap();
         let screen = self.probe.screen(Some(&table), &About::default());

@@ -51,7 +51,7 @@ impl Bench {
         low * libm::sqrtf(low) / 0.0115
     }
 
-    /// Lets the lever go on until it is in this state.
+    /// Runs the lever until it is in this state.
     fn until(&mut self, wanted: LeverState) -> Result<(), Fault> {
         for _ in 0..60_000 {
             let counts = if self.torn { 0.0 } else { self.counts() };

@@ -75,7 +75,7 @@ impl Bench {
         self.sent.last().unwrap().1.task
     }
 
-    /// Homed, and asked for a movement whose press is ordered.
+    /// Homed, with a movement whose press is ordered.
     fn pressing(movement: Movement) -> Self {
         let mut bench = Self::new();
         bench.run(50);
@@ -190,7 +190,7 @@ fn too_much_force_demands_a_stop_in_the_same_millisecond() {
     let mut bench = Bench::sliding(movement);
     bench.says(ArmState::Steady, 300);
     let since = bench.ms;
-    // 0.9 N where half a newton was asked for
+    // 0.9 N instead of half a newton
     bench.counts = 900.0 / bench.rig.calibration.pressure.force_mn_per_count;
     let (fault, ms) = faulted(&mut bench, since);
     assert_eq!(fault, Fault::ForceHigh);

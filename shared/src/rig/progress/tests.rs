@@ -187,8 +187,8 @@ fn a_lever_that_slips_is_told_from_a_dead_pressure() {
     }
 }
 
-/// Up to the force that every rig may press whatever the leak, if it only holds a pressure for 0.2 s; up to 2 N where
-/// it is quick.
+/// Up to the force that every rig may press with any leak, if it only holds a pressure for 0.2 s; up to 2 N where it is
+/// quick.
 #[test]
 fn a_leaking_skin_is_not_pressed_too_hard() {
     // up to the softest of the simulated worlds

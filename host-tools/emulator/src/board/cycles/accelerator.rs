@@ -72,7 +72,7 @@ pub struct Accelerator {
     data: Cache,
     current: Option<u32>,
     ahead: Option<Ahead>,
-    /// The first cycle in which the array is not read any more, but for what is read ahead.
+    /// The first cycle in which the array is free, except for prefetches.
     free: u64,
 }
 

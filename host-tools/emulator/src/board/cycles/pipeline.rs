@@ -12,7 +12,7 @@ const ENTRY: u64 = 12;
 const RETURN: u64 = 10;
 const TAIL_CHAIN: u64 = 6;
 /// Of the entry, nine cycles put registers on the stack; meanwhile the vector is read and the handler's first
-/// instruction fetched, which take six and what they wait (ARM's article 103489845 on interrupt latency).
+/// instruction fetched, which take six and their waits (ARM's article 103489845 on interrupt latency).
 const ENTRY_HIDES: u64 = 9 - 6;
 /// S0 to S15 and FPSCR, put aside at the first instruction of a handler for the FPU, and brought back at its end.
 const FLOATS: u64 = 17;

@@ -145,15 +145,15 @@ pub(crate) struct Tracer {
     groups: usize,
     decoded: FxHashMap<u32, ([u16; 2], Instruction)>,
     pending: Option<Pending>,
-    /// Not 0 there: what is executed counts.
+    /// Instructions count while this is not 0.
     switch: Option<u32>,
     counts: bool,
     pub(crate) profile: CycleProfile,
 }
 
 impl Tracer {
-    /// Follows all code there from now on. Handlers are told apart by their groups. With a switch, what is executed
-    /// counts while the word at that address is not 0.
+    /// Follows all code there from now on. Handlers are distinguished by their groups. With a switch, instructions
+    /// count while the word at that address is not 0.
     pub(crate) fn new(
         code: Vec<Range<u64>>,
         groups: &[Vec<u64>],
@@ -335,7 +335,7 @@ fn word_at(at: u32, host: &mut dyn Host) -> u32 {
     low >> 16 | word((at & !3) + 4, host) << 16
 }
 
-/// The address of a load, by the registers as they are before it; what is on the stack is in RAM.
+/// The address of a load, by the registers as they are before it; the stack is in RAM.
 fn resolve(address: Address, host: &mut dyn Host) -> Option<u32> {
     let mut value = |number: u8| register(host, number.into());
     match address {

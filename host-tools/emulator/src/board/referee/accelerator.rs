@@ -14,7 +14,7 @@ pub(super) struct Accelerator {
 }
 
 impl Accelerator {
-    /// Clocks, or what is on, have changed.
+    /// Clocks, prefetch or cache have changed.
     pub(super) fn changed(&mut self, at_ns: u64, core_mhz: u32, quick: bool) {
         self.slow_since_ns = match self.slow_since_ns {
             _ if quick || core_mhz <= NO_WAIT_MHZ => None,

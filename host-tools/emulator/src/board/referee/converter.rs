@@ -48,7 +48,7 @@ impl Converters {
         if after & ADON == 0 || at_ns < on_ns + STEADY_NS {
             wrong.push((Rule::Unsteady, of.name.to_owned()));
         }
-        // RM0090 13.8.1: without DDS the stream's last transfer is the last that is asked for
+        // RM0090 13.8.1: without DDS the stream's last transfer is the last request
         if after & (CONT | DMA | DDS) == CONT | DMA && fills_a_ring(of, &word) {
             wrong.push((Rule::RequestsEnd, of.name.to_owned()));
         }

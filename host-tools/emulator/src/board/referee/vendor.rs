@@ -88,7 +88,7 @@ fn bits(field: &Field) -> u32 {
     all.fold(0, |bits, at| bits | each << at)
 }
 
-/// A field set and what it extends.
+/// A field set and the ones that it extends.
 fn field_sets<'a>(ir: &'a IR, name: &'a str) -> impl Iterator<Item = &'a FieldSet> {
     let find = |name: &str| ir.fieldsets.iter().find(|set| same(set.name, name));
     std::iter::successors(find(name), move |set| find(set.extends?))

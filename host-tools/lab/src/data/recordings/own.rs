@@ -12,7 +12,7 @@
 //! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; empty if there is a power |
 //! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
 //! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline |
-//! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force, mN, positive against motion; empty if not measured |
+//! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force against the motion, mN; empty if not measured |
 //! | `lot`, `operator`, `note` | batch or piece, operator, remark; may be empty or missing |
 //! | `moved` | sample moved or turned since the slide before: `yes`, `no`, or empty or missing if unknown |
 //! | `finger` | the finger: `biotac`, `analog` or `mems`; empty or missing for a BioTac |

@@ -370,7 +370,7 @@ fn the_writer_refuses_what_the_reader_would() {
     let other = message(other.unwrap_err());
     assert!(other.contains("not whole, by: test"), "{other}");
 
-    // and the same one goes on, once
+    // and the same one continues, once
     let mut writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
     assert!(writer.has(0, 1) && !writer.has(1, 1));
     writer.write(&slide(1, 1)).unwrap();

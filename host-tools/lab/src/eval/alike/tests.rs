@@ -173,7 +173,7 @@ fn as_many_slides_are_taken_for_the_others_as_is_said() {
                     "{features} features, {trials:?} trials, {apart:?} apart: said {said:.3}, seen {seen:.3}"
                 );
                 if apart == [0.0; 3] {
-                    // one texture: chance alone tells them apart, and ten slides do not
+                    // one texture: only chance separates them, and ten slides do not
                     assert!(said > 0.25 && seen > 0.25, "{which}");
                 } else {
                     assert!((said - seen).abs() < 0.1, "{which}");

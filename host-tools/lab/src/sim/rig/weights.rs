@@ -157,7 +157,7 @@ fn weights_on_the_lifted_finger_give_its_force_per_count() {
         let model = Reader::new(finger).model().calibration;
         let share = weighed.mn_per_count / model.force_mn_per_count;
         assert!((share - 1.0).abs() < 0.03, "{finger}, {seed}: {weighed:?}");
-        // no weight is asked for any more: a press now is a fault
+        // the request for a weight is over: a press now is a fault
         let servo = &mut rig.servo;
         assert_eq!(servo.lay(0.3), Phase::Ready, "{finger}, {seed}");
         let phase = servo.lay(0.6);
@@ -174,7 +174,7 @@ fn a_load_cell_that_is_wired_the_wrong_way_round_falls() {
     }
 }
 
-/// A weight of 150 g is asked for, and 230 g lie there.
+/// The rig asks for a weight of 150 g, and 230 g lie there.
 #[test]
 fn too_heavy_a_weight_stops() {
     each(1, |finger, seed| {
@@ -241,7 +241,7 @@ fn an_accelerometer_that_is_turned_over_says_what_a_count_is() {
     });
 }
 
-/// In a hand that leans by 11 degrees rms a g looks smaller, and what is too far askew is refused.
+/// In a hand that leans by 11 degrees rms a g looks smaller, and a turn that is too far askew is refused.
 #[test]
 fn a_hand_that_leans_measures_a_little_less() {
     let each = (1..=50u64).into_par_iter().map(|seed| {

@@ -195,12 +195,12 @@ fn a_store_waits_in_the_write_buffer() {
             .collect();
         each
     };
-    // what does not touch the bus goes on
+    // instructions that do not use the bus continue
     assert_eq!(
         cycles(&[(STR, Some(TIM2)), (ADDS, None), (ADDS, None)]),
         [1; 3]
     );
-    // the next access, to whatever memory, does not: 2 + 12, or 1 + 12
+    // the next access, to any memory, does not: 2 + 12, or 1 + 12
     for next in [RAM, TIM2, PORT] {
         let waits = if next == RAM {
             0
