@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: what the kernels cost, counted on the emulated chip; with `--pc`, how long they take on this PC.
+//! `cargo xtask bench`: what the kernels cost, counted on the emulated chip; with `--pc`, how long they take on this
+//! PC.
 use std::ffi::OsString;
 use std::process::Command;
 

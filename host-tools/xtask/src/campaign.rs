@@ -36,7 +36,7 @@ const BOOK: &str = "docs/src/tests.md";
 #[derive(Args)]
 pub(crate) struct Options {
     /// Part to run
-    #[arg(value_enum)]
+    #[arg(value_enum, default_value_t = Part::All)]
     part: Part,
     /// Seeds of a part that takes them; each has its own default
     #[arg(long, value_name = "A-B", value_parser = range)]
@@ -94,11 +94,13 @@ enum Part {
     Verify,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
     Press,
-    /// libFuzzer against frames, tables, the store's flash, recordings and scenarios, on stable Rust; wants a C++ compiler
+    /// libFuzzer against frames, tables, the store's flash, recordings and scenarios, on stable Rust; wants a C++
+    /// compiler
     Fuzz,
     /// The same with a bug planted in each target, which must be found
     Planted,
-    /// The core's tests on copies of the core with one thing changed (cargo-mutants): a mutant that survives is seen by no test
+    /// The core's tests on copies of the core with one thing changed (cargo-mutants): a mutant that survives is seen by
+    /// no test
     Mutants,
 }
 

@@ -24,8 +24,8 @@ pub(crate) const HANDHELD: &str = "tactus-handheld";
 /// The image of a probe on somebody else's arm.
 pub(crate) const ARM: &str = "tactus-arm";
 
-/// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where a TCP port
-/// for it is given.
+/// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where
+/// a TCP port for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
     let (by_hand, options): (Vec<_>, Vec<_>) =
         options.iter().cloned().partition(|o| o == "--handheld");
@@ -139,8 +139,8 @@ fn cargo_there(command: &str) -> Command {
     let mut cargo = cargo();
     // its own configuration is read from there
     cargo.current_dir(root().join("host-tools/emulator"));
-    // rigless declares Rust 1.98, and cranelift below it 1.96: they build with 1.95, which the README names, and these tests are
-    // run with that
+    // rigless declares Rust 1.98, and cranelift below it 1.96: they build with 1.95, which the README names, and these
+    // tests are run with that
     cargo.args([command, "--locked", "--ignore-rust-version"]);
     cargo.arg("--target-dir").arg(folder());
     cargo

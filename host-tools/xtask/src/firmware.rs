@@ -9,8 +9,8 @@ use sha2::{Digest as _, Sha256};
 use crate::shell::root;
 use crate::toolchain::{self, CHIP};
 
-/// The images, all in one build configuration: the rig's, a hand's, an arm's, the self-test, and the tests of the chip with the
-/// bench.
+/// The images, all in one build configuration: the rig's, a hand's, an arm's, the self-test, and the tests of the chip
+/// with the bench.
 pub(crate) const IMAGES: [&str; 5] = [
     "tactus-rig",
     "tactus-handheld",

@@ -22,7 +22,8 @@ use clap::Parser;
 
 /// Builds, tests and measures Tactus.
 ///
-/// `cargo xtask test` is the whole check, as CI runs it. For one test use cargo itself: `cargo test -p tactus-core grid`.
+/// `cargo xtask test` is the whole check, as CI runs it. For one test use cargo itself:
+/// `cargo test -p tactus-core grid`.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 enum Cli {
@@ -32,12 +33,14 @@ enum Cli {
     Check,
     /// Run every check: formatting, lints, licences, tests, documentation, firmware
     ///
-    /// All of them run even when one fails, in two rows side by side; the output of each comes when it is over. The last lines
-    /// say what ran and how long it took, and what was skipped and why; tests that want recordings are skipped where there are
-    /// none (TACTUS_REQUIRE_DATA=1 makes them fail instead). Longer checks: `cargo xtask campaign`.
+    /// All of them run even when one fails, in two rows side by side; the output of each comes when it is over. The
+    /// last lines say what ran and how long it took, and what was skipped and why; tests that want recordings are
+    /// skipped where there are none (TACTUS_REQUIRE_DATA=1 makes them fail instead). Longer checks:
+    /// `cargo xtask campaign`.
     ///
-    /// The images are built by the active toolchain if it has their target, or else by Debian's; TACTUS_TOOLCHAIN=debian or
-    /// TACTUS_TOOLCHAIN=active asks for one of them. The last line names the compiler that made them.
+    /// The images are built by the active toolchain if it has their target, or else by Debian's;
+    /// TACTUS_TOOLCHAIN=debian or TACTUS_TOOLCHAIN=active asks for one of them. The last line names the compiler that
+    /// made them.
     Test {
         /// Run this step only, in this process
         #[arg(long, value_name = "NAME")]
@@ -55,25 +58,26 @@ enum Cli {
     },
     /// Run a long check or all of them: many explorations, power cuts, faults, hours of work, fuzzing, mutants
     ///
-    /// Each part says in one sentence how it ended; with `all`, or with --book, that sentence is a row of a table. An error if
-    /// a part misses a limit.
+    /// Each part says in one sentence how it ended; with `all`, or with --book, that sentence is a row of a table. An
+    /// error if a part misses a limit.
     #[command(after_help = campaign::EXAMPLES)]
     Campaign(campaign::Options),
     /// Count what the core's kernels cost on the chip
     ///
-    /// Instructions of the bench in the silicon image on the emulated board, the same code as in the rig's image, on a slide of a real finger
-    /// where there is one; every result is compared with the plain kernels' on this PC. An error if a kernel misses its gate.
+    /// Instructions of the bench in the silicon image on the emulated board, the same code as in the rig's image, on a
+    /// slide of a real finger where there is one; every result is compared with the plain kernels' on this PC. An error
+    /// if a kernel misses its gate.
     #[command(after_help = bench::EXAMPLES)]
     Bench(bench::Options),
     /// Build the firmware; list each image with its hash, its memory and the rig's deepest stack
     ///
-    /// The stack is measured on the emulated board, during an exploration. An error if an image takes more flash or variables
-    /// than it may, or if twice the stack does not fit beside them. Lists the largest symbols, and the functions that panic
-    /// with their callers.
+    /// The stack is measured on the emulated board, during an exploration. An error if an image takes more flash or
+    /// variables than it may, or if twice the stack does not fit beside them. Lists the largest symbols, and the
+    /// functions that panic with their callers.
     ///
-    /// Builds with the active Rust toolchain if that has the target thumbv7em-none-eabihf (`rustup target add
-    /// thumbv7em-none-eabihf`). If it has not, Debian's Rust packages build it, and where those are missing too, root gets
-    /// them installed by apt-get.
+    /// Builds with the active Rust toolchain if that has the target thumbv7em-none-eabihf
+    /// (`rustup target add thumbv7em-none-eabihf`). If it has not, Debian's Rust packages build it, and where those are
+    /// missing too, root gets them installed by apt-get.
     #[command(after_help = size::EXAMPLES)]
     Size(size::Options),
     /// Build the firmware and flash it to the board (NUCLEO-F429ZI) with probe-rs
@@ -83,13 +87,15 @@ enum Cli {
     Flash(flash::Options),
     /// Build the page with a simulated probe for a browser: target/page/index.html
     ///
-    /// One file without any network: a double click opens it. Builds for WebAssembly with the active Rust toolchain if that
-    /// has the target wasm32-unknown-unknown (`rustup target add wasm32-unknown-unknown`), otherwise with Debian's packages.
+    /// One file without any network: a double click opens it. Builds for WebAssembly with the active Rust toolchain if
+    /// that has the target wasm32-unknown-unknown (`rustup target add wasm32-unknown-unknown`), otherwise with Debian's
+    /// packages.
     Page,
     /// Build the book, or check and write what is generated in README and book
     #[command(after_help = docs::EXAMPLES)]
     Docs(docs::Options),
-    /// Make a release: images, command, Python package, page, tables, licences, hash sums, and how to flash without a checkout
+    /// Make a release: images, command, Python package, page, tables, licences, hash sums, and how to flash without a
+    /// checkout
     ///
     /// An ELF has the symbols that `probe-rs attach` reads the log with; .bin and .hex are the same image for other
     /// programmers. What this machine cannot build is left out, and said; with CI=true that is an error.

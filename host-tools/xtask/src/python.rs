@@ -17,8 +17,8 @@ const WELCOME: [&str; 2] = ["matplotlib", "scikit-learn"];
 const OLD_ENOUGH: &str =
     "import sys, venv, ensurepip; sys.exit(0 if sys.version_info >= (3, 9) else 1)";
 
-/// Lints the package, has pip build and install it, and runs its tests. Skipped where there is no Python or no way to what pip
-/// needs; in CI that is an error.
+/// Lints the package, has pip build and install it, and runs its tests. Skipped where there is no Python or no way to
+/// what pip needs; in CI that is an error.
 pub(crate) fn check() -> Result<()> {
     let python = match environment() {
         Ok(python) => python,

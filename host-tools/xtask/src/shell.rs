@@ -49,7 +49,8 @@ pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Does the work with each of many, so many at a time, and shows progress on a terminal. Returns the results in no order.
+/// Does the work with each of many, so many at a time, and shows progress on a terminal. Returns the results in no
+/// order.
 pub(crate) fn each_of<T: Sync, R: Send>(
     all: &[T],
     at_a_time: usize,
@@ -94,7 +95,8 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a command, passes on what it prints, and hands each line to `on_line`; an error, with the last line, unless it succeeds.
+/// Runs a command, passes on what it prints, and hands each line to `on_line`; an error, with the last line, unless it
+/// succeeds.
 pub(crate) fn hear(command: &mut Command, mut on_line: impl FnMut(&str)) -> Result<()> {
     let program = command.get_program().display().to_string();
     let child = command.stdout(Stdio::piped()).spawn();

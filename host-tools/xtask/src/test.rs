@@ -14,8 +14,8 @@ use crate::{bench, emulate, firmware, page, python, size};
 /// A check, which runs in a process of its own: `cargo xtask test --step NAME`.
 type Step = (&'static str, fn() -> Result<()>);
 
-/// Two rows of steps for two cores: a build has a long tail of a single thread. Steps of a row use what those before them have
-/// built, and the rows build into folders of their own, so that cargo's locks keep none waiting.
+/// Two rows of steps for two cores: a build has a long tail of a single thread. Steps of a row use what those before
+/// them have built, and the rows build into folders of their own, so that cargo's locks keep none waiting.
 const ROWS: [&[Step]; 2] = [
     &[
         ("formatting", formatting),
@@ -120,12 +120,12 @@ pub(crate) fn one(name: &str) -> Result<()> {
 pub(crate) fn check() -> Result<()> {
     formatting()?;
     lints()?;
-    let packages = ["--package", "tactus-core", "--package", "tactus-lab"];
-    tests(
-        cargo()
-            .args(["test", "--lib", "--no-fail-fast"])
-            .args(packages),
-    )
+    let mut unit_tests = cargo();
+    unit_tests.args(["test", "--lib", "--no-fail-fast"]);
+    for package in ["core", "link", "world", "lab"] {
+        unit_tests.args(["--package", &format!("tactus-{package}")]);
+    }
+    tests(&mut unit_tests)
 }
 
 /// A step that is over: its name, the seconds that it took, and why it failed if it did.
@@ -235,7 +235,8 @@ mod tests {
     fn failed_tests_say_why_in_a_few_lines() {
         let long = "noise\n".repeat(30);
         let printed = format!(
-            "test a ... FAILED\n\nfailures:\n\n---- a stdout ----\n\nthread 'a' panicked at x.rs:1:\nleft\nstack backtrace:\n  0: y\n---- b stdout ----\n{long}"
+            "test a ... FAILED\n\nfailures:\n\n---- a stdout ----\n\nthread 'a' panicked at x.rs:1:\nleft\n\
+             stack backtrace:\n  0: y\n---- b stdout ----\n{long}"
         );
         let lines: Vec<String> = printed.lines().map(str::to_owned).collect();
         let expected = format!(

@@ -21,14 +21,23 @@ fn workflows_and_pages_ask_for_commands_that_there_are() {
     files.extend([".ci/run", "README.md", "CONTRIBUTING.md"].map(str::to_owned));
     let mut asked = 0;
     for file in files {
-        for asks in text(&file).split("cargo xtask ").skip(1) {
+        for asks in text(&file)
+            .replace("-->", "\n")
+            .split("cargo xtask ")
+            .skip(1)
+        {
+            // a command of an earlier commit, which the page names
+            let soon: String = asks.chars().take(60).collect();
+            if soon.contains("commit ") {
+                continue;
+            }
             let end = asks.find(['#', '`', '&', '|', ';', '\n', '(', ')']);
             let words = asks[..end.unwrap_or(asks.len())].split_whitespace();
             let words = words.map(|word| word.trim_matches([',', '.', ':']));
             let parsed = Cli::try_parse_from(["xtask"].into_iter().chain(words));
             // "--help" ends it, too
             let is_wrong = parsed.as_ref().is_err_and(clap::Error::use_stderr);
-            assert!(!is_wrong, "{file}: {asks:.60}: {}", parsed.err().unwrap());
+            assert!(!is_wrong, "{file}: {soon}: {}", parsed.err().unwrap());
             asked += 1;
         }
     }

@@ -138,8 +138,8 @@ impl Toolchain {
 
     /// A `cargo build` for a target, without profile and package.
     ///
-    /// What is built is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders are left out
-    /// of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies.
+    /// What is built is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders
+    /// are left out of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies.
     pub(crate) fn cargo_build(self, to: Target) -> Command {
         let mut cargo = match self {
             Self::Active => cargo(),
@@ -147,7 +147,7 @@ impl Toolchain {
         };
         cargo
             .env("CARGO_ENCODED_RUSTFLAGS", rustflags())
-            .args(["build", "--target", to.triple, "--target-dir"])
+            .args(["build", "--locked", "--target", to.triple, "--target-dir"])
             .arg(self.folder(to));
         if self == Self::Debian {
             cargo.arg(format!("-Zbuild-std={}", to.library));

@@ -1,4 +1,4 @@
-//! The tables that come with the firmware: textures of a simulated world, learned there by `cargo xtask factory`. A
+//! The tables that come with the firmware: textures of a simulated world, learned there by `cargo xtask campaign factory`. A
 //! probe is trained by its user, or receives a table from the host. A table that is not named takes no space in an
 //! image.
 use crate::sensor::FingerName;

@@ -71,8 +71,9 @@ fn folder(name: &str) -> Option<PathBuf> {
 /// The text about these crates, each with its licence and the files of its licences.
 fn listed(crates: &[(String, String, Vec<String>)]) -> String {
     let mut all = String::from(
-        "The crates that the files of this release are linked with, and their licences; Rust's standard library, MIT OR Apache-2.0, is in each of them.\n\
-         Where a crate has no text, MIT and Apache-2.0 read as in LICENSE-MIT and LICENSE-APACHE, with its authors in place of ours.\n\n",
+        "The crates that the files of this release are linked with, and their licences.\n\
+         Rust's standard library, MIT OR Apache-2.0, is in each of them. Where a crate has no text,\n\
+         MIT and Apache-2.0 read as in LICENSE-MIT and LICENSE-APACHE, with its authors in place of ours.\n\n",
     );
     let mut texts: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (name, licence, files) in crates {

@@ -53,8 +53,8 @@ impl Explored {
     }
 }
 
-/// The figures of many: median and worst error of the force of a slide, and sums of what was lost, late and damaged. Nothing of runs
-/// without slides.
+/// The figures of many: median and worst error of the force of a slide, and sums of what was lost, late and damaged.
+/// Nothing of runs without slides.
 pub(super) fn figures<'e>(all: impl Iterator<Item = &'e Explored>) -> Option<Value> {
     let (mut errors, mut sums, mut ends) = (Vec::new(), [0; 3], Vec::new());
     for explored in all {
@@ -112,7 +112,8 @@ mod tests {
 
     fn explored(verdict: &str, force_errors: &str, late: u32, end: &str) -> Option<Explored> {
         Explored::of(&format!(
-            "An ELF.\n{{{end}\"verdict\":\"{verdict}\",\"says\":\"Silk?\",\"truth\":\"Wool\",\"force_errors\":{force_errors},\"lost\":1,\"late\":{late},\"damaged\":0}}\n"
+            "An ELF.\n{{{end}\"verdict\":\"{verdict}\",\"says\":\"Silk?\",\"truth\":\"Wool\",\"lost\":1,\
+             \"force_errors\":{force_errors},\"late\":{late},\"damaged\":0}}\n"
         ))
     }
 

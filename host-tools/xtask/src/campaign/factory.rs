@@ -16,8 +16,8 @@ const SLIDES_BY_HAND: &str = "15";
 
 /// Where they are kept: in the core, which has them as constants.
 pub(crate) const FOLDER: &str = "shared/tables";
-/// The rig's table and the handheld's of each finger, with the finger's name; then that of a probe on an arm, for the only finger that
-/// has an image for it.
+/// The rig's table and the handheld's of each finger, with the finger's name; then that of a probe on an arm, for the
+/// only finger that has an image for it.
 pub(crate) const TABLES: [(&str, &[&str]); 3] = [
     ("biotac", &["factory.tact", "handheld.tact", "arm.tact"]),
     ("analog", &["factory-analog.tact", "handheld-analog.tact"]),
@@ -82,7 +82,7 @@ fn same(name: &str, committed: &[u8], made: &[u8]) -> Result<()> {
     ensure!(
         at.is_none() && committed.len() == made.len(),
         "{FOLDER}/{name} is not what world {SEED} gives: {} bytes there, {} made, first difference at byte {}.\n\
-         If simulator, features or table were changed on purpose: cargo xtask campaign factory -- --write, and commit the file",
+         If simulator, features or table were changed on purpose: cargo xtask campaign factory -- --write",
         committed.len(),
         made.len(),
         at.unwrap_or(committed.len().min(made.len()))

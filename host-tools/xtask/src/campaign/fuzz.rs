@@ -1,5 +1,5 @@
-//! libFuzzer against the parsers. Its flags are those of cargo-fuzz without a sanitizer, which stable Rust takes: memory is safe
-//! here, and what is looked for are panics, overflows and memory without bounds.
+//! libFuzzer against the parsers. Its flags are those of cargo-fuzz without a sanitizer, which stable Rust takes:
+//! memory is safe here, and what is looked for are panics, overflows and memory without bounds.
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -158,7 +158,8 @@ mod tests {
 
     #[test]
     fn a_crash_says_what_and_where() {
-        let log = "#12 NEW cov: 40\nthread 'main' panicked at src/lib.rs:3:5:\nplanted\nnote: backtrace\n==1== ERROR: libFuzzer: deadly signal\nartifact_prefix='x'; Test unit written to x-1\n";
+        let log = "#12 NEW cov: 40\nthread 'main' panicked at src/lib.rs:3:5:\nplanted\nnote: backtrace\n\
+                   ==1== ERROR: libFuzzer: deadly signal\nartifact_prefix='x'; Test unit written to x-1\n";
         let why = why(log);
         assert!(why.contains("src/lib.rs:3:5") && why.contains("planted") && why.contains("x-1"));
         assert!(!why.contains("backtrace"));

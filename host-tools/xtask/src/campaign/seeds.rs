@@ -1,4 +1,5 @@
-//! Parts that draw from a seed: each run is a process of its own, on one core. Wrong verdicts are counted; none may fail.
+//! Parts that draw from a seed: each run is a process of its own, on one core. Wrong verdicts are counted; none may
+//! fail.
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::process::Command;
@@ -26,7 +27,8 @@ const METHODS: [&str; 8] = [
 /// Names the world of the test of presses.
 const WORLD: &str = "TACTUS_PRESSES_WORLD";
 
-/// One run: its name, its words for the program, and how the line begins that is right if the program does not know that.
+/// One run: its name, its words for the program, and how the line begins that is right if the program does not know
+/// that.
 struct Run {
     name: String,
     seed: u64,
@@ -130,7 +132,10 @@ pub(super) fn run(part: Part, seeds: &RangeInclusive<u64>, options: &Options) ->
     .map(count);
     let board = board::figures(ended.iter().filter_map(|ended| ended.explored.as_ref()));
     let listed = ended.iter().filter(|ended| ended.ending > Ending::Right);
-    let listed = listed.map(|e| json!({"run": e.name, "ending": format!("{:?}", e.ending), "repeat": e.repeat, "said": e.said}));
+    let listed = listed.map(|e| {
+        let ending = format!("{:?}", e.ending);
+        json!({"run": e.name, "ending": ending, "repeat": e.repeat, "said": e.said})
+    });
     let summary = json!({
         "part": part.name(), "finger": options.finger, "seeds": [seeds.start(), seeds.end()],
         "runs": ended.len(), "right": right, "wrong": wrong, "undecided": undecided, "failed": failed,

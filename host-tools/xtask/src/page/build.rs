@@ -1,7 +1,8 @@
 //! The page with the simulated probe: one file of HTML, with its script, its style and the WebAssembly module in it.
 //!
-//! One file, since a browser loads neither modules nor WebAssembly from beside a page that was opened from a folder. For the same
-//! reason its scripts are plain ones; a content-security policy allows these by their hashes, and nothing else.
+//! One file, since a browser loads neither modules nor WebAssembly from beside a page that was opened from a folder.
+//! For the same reason its scripts are plain ones; a content-security policy allows these by their hashes, and nothing
+//! else.
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
@@ -96,7 +97,8 @@ fn assemble(folder: &Path, module: &[u8], trials: &[u8]) -> Result<String> {
     let [scripts, styles] = hashes;
     // no connection, no form, no frame: what is done here stays here
     let csp = format!(
-        "default-src 'none'; script-src 'wasm-unsafe-eval'{scripts}; style-src{styles}; img-src data:; base-uri 'none'; form-action 'none'"
+        "default-src 'none'; script-src 'wasm-unsafe-eval'{scripts}; style-src{styles}; img-src data:; \
+         base-uri 'none'; form-action 'none'"
     );
     for (mark, text) in [
         ("{{csp}}", csp),
@@ -124,7 +126,8 @@ mod tests {
         folder
     }
 
-    const HTML: &str = "<meta content=\"{{csp}}\"><link rel=\"stylesheet\" href=\"a.css\"><p id=w>{{wasm}}</p><p id=t>{{trials}}</p><script src=\"a.js\"></script>";
+    const HTML: &str = "<meta content=\"{{csp}}\"><link rel=\"stylesheet\" href=\"a.css\">\
+        <p id=w>{{wasm}}</p><p id=t>{{trials}}</p><script src=\"a.js\"></script>";
 
     #[test]
     fn all_that_a_page_names_is_in_it_and_allowed_by_its_hash() {

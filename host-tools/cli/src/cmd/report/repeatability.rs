@@ -1,4 +1,4 @@
-//! `tactus gauge`: how repeatable probe and operators are.
+//! `tactus report` without a table: how repeatable probe and operators are.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -9,37 +9,14 @@ use tactus_core::features::{Movement, Property};
 use tactus_lab::data::recording::Labels;
 use tactus_lab::eval::gauge::{Reading, Study, distinct, study};
 use tactus_lab::eval::show::count;
+use tactus_study::chart::{DrawError, Figure};
 use tactus_study::pictures::control;
 
-use super::args::Recordings;
-use super::output::{Format, UsageError, percent, print_json};
-use super::plot::Plot;
-use super::textures::measure_folder;
+use crate::cmd::output::{Format, UsageError, percent, print_json};
+use crate::cmd::plot::Plot;
+use crate::cmd::textures::measure_folder;
 
-/// Tell how repeatable probe and operators are: variance by part, operator and repetition
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  tactus gauge --recordings DIR                             one folder, with or without operators
-  tactus gauge --recordings ANNA --and BEN --plot charts    each recorded by an operator, and control charts
-  tactus device record cork felt --slides 5 --operator Anna --lot 7 --out ANNA
-
-A part is a texture, or a lot of it. Operators are compared if each of them touched every part. Below 10 % of all variation
-a gauge is usually called good, above 30 % not acceptable; it should tell at least five classes apart.")]
-pub(crate) struct Args {
-    #[command(flatten)]
-    from: Recordings,
-    /// Another folder of the same study; may be given several times
-    #[arg(long = "and", value_name = "DIR")]
-    more: Vec<PathBuf>,
-    #[command(flatten)]
-    plot: Plot,
-    /// How to print the results
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
-}
-
-/// What `gauge --format json` prints.
+/// The object that `report --format json` prints of recordings alone.
 #[derive(Serialize)]
 struct Gauged {
     parts: usize,
@@ -80,48 +57,53 @@ struct Taken {
     values: [Option<f32>; 3],
 }
 
-/// Prints what the folders come to.
-pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let canvas = args.plot.open()?;
-    let mut folders = vec![args.from.folder()?];
-    for folder in &args.more {
-        if folders.contains(folder) {
-            let say = format!("--and {}: this folder was given before", folder.display());
+/// Prints the variances of the slides in `folders`, and draws control charts.
+pub(super) fn run(
+    folders: &[PathBuf],
+    plot: &Plot,
+    format: Format,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let canvas = plot.open()?;
+    let mut slides = Vec::new();
+    for (n, folder) in folders.iter().enumerate() {
+        if folders[..n].contains(folder) {
+            let say = format!(
+                "--recordings {}: this folder was given before",
+                folder.display()
+            );
             return Err(UsageError(say).into());
         }
-        folders.push(folder.clone());
-    }
-    let mut slides = Vec::new();
-    for folder in &folders {
         take(folder, &mut slides)?;
     }
     let gauged = gauge(&slides)?;
-    match args.format {
+    match format {
         Format::Json => print_json(&gauged, out)?,
         Format::Text => print(&gauged, out)?,
     }
     if let Some(canvas) = canvas {
-        let mut figures = Vec::new();
-        for (at, movement) in (1..).zip(&gauged.movements) {
-            for gauge in &movement.properties {
-                let (property, unit) = (gauge.property, gauge.unit);
-                let many = gauged.movements.len() > 1;
-                let id = format!("control-{property}");
-                let id = if many { format!("{id}-{at}") } else { id };
-                let title = format!("{property}, {}", movement.movement);
-                let unit = format!(" ({unit})");
-                figures.push(control::figure(
-                    &id,
-                    &title,
-                    &unit,
-                    &gauge.readings,
-                    &gauge.study,
-                )?);
-            }
-        }
-        canvas.write("Control charts", &figures, out)?;
+        canvas.write("Control charts", &charts(&gauged)?, out)?;
     }
     Ok(())
+}
+
+/// Draws a control chart for each property at each movement.
+fn charts(gauged: &Gauged) -> Result<Vec<Figure>, DrawError> {
+    let mut figures = Vec::new();
+    for (at, movement) in (1..).zip(&gauged.movements) {
+        for gauge in &movement.properties {
+            let property = gauge.property;
+            let id = match gauged.movements.len() {
+                1 => format!("control-{property}"),
+                _ => format!("control-{property}-{at}"),
+            };
+            let title = format!("{property}, {}", movement.movement);
+            let unit = format!(" ({})", gauge.unit);
+            let (readings, study) = (&gauge.readings, &gauge.study);
+            figures.push(control::figure(&id, &title, &unit, readings, study)?);
+        }
+    }
+    Ok(figures)
 }
 
 fn take(folder: &Path, slides: &mut Vec<Taken>) -> anyhow::Result<()> {
