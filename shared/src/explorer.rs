@@ -11,7 +11,6 @@ mod episode;
 pub mod kernels;
 mod likelihoods;
 mod novelty;
-mod objective;
 pub mod overlap;
 mod paced;
 mod posterior;
@@ -26,7 +25,6 @@ pub use confusions::{Confusions, Degrees};
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
-pub use objective::{Objective, SlideTime};
 pub use posterior::{Explorer, Told, Verdict};
 pub use verify::ENOUGH_TRIALS;
 

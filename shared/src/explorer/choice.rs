@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use super::config::{Method, NEGLIGIBLE, Strategy};
 use super::kernels::{Kernels, LiveGaussian, LiveTexture, confused, exp_neg, left};
-use super::objective::{Objective, SlideTime};
 use super::posterior::Explorer;
 use super::whitened;
 use crate::features::Property;
@@ -24,17 +23,6 @@ pub struct ExpectedOutcome {
     /// Its benefit (eq. 12), lower the more often it was made.
     pub benefit: f32,
 }
-impl ExpectedOutcome {
-    /// Bits by which this action, made `made` times before, is expected to lower an `uncertainty` (eq. 11); never below 0. The
-    /// more often it was made the less it is worth, by the exponent of eq. 12.
-    pub fn bits(&self, uncertainty: f32, made: u8) -> f32 {
-        // a logarithm of 0 is no number to compare
-        let left = self.uncertainty.max(f32::MIN_POSITIVE);
-        let gained = libm::log2f(uncertainty.max(f32::MIN_POSITIVE) / left);
-        gained.max(0.0) / (f32::from(made) + 1.0)
-    }
-}
-
 /// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
 pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
     confused(a, b, K::sqrt)
@@ -62,7 +50,15 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let chosen = match self.config.strategy {
             Strategy::Bayesian => {
                 let outcomes = outcomes.iter().filter(|o| !self.is_left_out(o.action));
-                self.most_useful(outcomes)
+                // the first of equals
+                let best = outcomes.reduce(|best, next| {
+                    if next.benefit > best.benefit {
+                        next
+                    } else {
+                        best
+                    }
+                });
+                best.map(|o| o.action)
             }
             Strategy::Cycling => {
                 let turns = self.turns().count().max(1);
@@ -79,55 +75,6 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             movement: 0,
             property: None,
         })
-    }
-
-    /// Of these outcomes the best one's action, the first of equals.
-    #[inline(always)]
-    fn most_useful<'o>(
-        &self,
-        outcomes: impl Iterator<Item = &'o ExpectedOutcome>,
-    ) -> Option<Action> {
-        if let Objective::BitsPerSecond(time) = self.config.objective {
-            return self.choose_by_rate(outcomes, time);
-        }
-        let best = outcomes.reduce(|best, next| {
-            if next.benefit > best.benefit {
-                next
-            } else {
-                best
-            }
-        });
-        best.map(|o| o.action)
-    }
-    /// Uncertainty (eq. 11) after a slide that tells nothing: every texture is confused with every other one.
-    fn uncertainty_now(&self) -> f32 {
-        // as eq. 10, which keeps the digits late in an exploration
-        let left = |p: &f32| p * (1.0 - p).max(0.0);
-        self.posterior.iter().map(left).sum()
-    }
-    /// Of these `outcomes`, the action that brings the most bits per second; of equals the one of greater benefit, then the
-    /// first.
-    fn choose_by_rate<'o>(
-        &self,
-        outcomes: impl Iterator<Item = &'o ExpectedOutcome>,
-        time: SlideTime,
-    ) -> Option<Action> {
-        let now = self.uncertainty_now();
-        let rate = |outcome: &ExpectedOutcome| {
-            let at = self.actions.iter().position(|a| *a == outcome.action);
-            let made = at.and_then(|at| self.made.get(at)).copied();
-            let movement = self.table.movement(outcome.action.movement)?;
-            Some(outcome.bits(now, made?) / time.seconds(movement))
-        };
-        let rated = outcomes.filter_map(|outcome| Some((rate(outcome)?, outcome)));
-        let best = rated.reduce(|best, next| {
-            if (next.0, next.1.benefit) > (best.0, best.1.benefit) {
-                next
-            } else {
-                best
-            }
-        });
-        best.map(|(_, outcome)| outcome.action)
     }
 
     /// The expected outcome of every action after the slides so far, in the order of the actions.

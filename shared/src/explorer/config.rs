@@ -2,7 +2,6 @@
 
 use core::fmt;
 
-use super::objective::Objective;
 use crate::features::{FeatureSet, Property};
 use crate::table::{Action, Contents};
 use serde::{Deserialize, Serialize};
@@ -89,8 +88,6 @@ pub struct Config {
     ///
     /// [`Explorer::verification`]: super::Explorer::verification
     pub verify: bool,
-    /// What Bayesian exploration chooses the next movement for.
-    pub objective: Objective,
 }
 
 impl Default for Config {
@@ -104,7 +101,6 @@ impl Default for Config {
             open: false,
             false_alarm: None,
             verify: false,
-            objective: Objective::Bits,
         }
     }
 }

@@ -4,7 +4,6 @@ mod confusions;
 mod drift;
 mod early;
 mod fused;
-mod objective;
 mod paced;
 mod rules;
 mod student;

@@ -152,7 +152,6 @@ const OPEN: Config = Config {
     threshold: 0.99,
     max_slides: 10,
     open: true,
-    objective: Objective::Bits,
 };
 const CLOSED: Config = Config {
     open: false,
