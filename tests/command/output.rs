@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-
 const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
 
 fn command(arguments: &[&str]) -> Command {
