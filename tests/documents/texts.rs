@@ -97,7 +97,11 @@ fn a_number_of_things_is_counted_by_one_function() {
     let mut files = Vec::new();
     for part in [
         "shared/src",
-        "host-tools/src",
+        "host-tools/link/src",
+        "host-tools/world/src",
+        "host-tools/lab/src",
+        "host-tools/study/src",
+        "host-tools/cli/src",
         "host-tools/emulator/src",
         "host-tools/xtask/src",
         "firmware/src",

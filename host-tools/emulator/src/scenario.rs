@@ -4,14 +4,14 @@
 
 use std::path::Path;
 
+use tactus_core::sensor::FingerName;
 use tactus_lab::eval::show::count;
+use tactus_lab::sim::handheld::ground;
+use tactus_lab::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
 use tactus_world::faults::Fault;
 use tactus_world::flow::HEIGHT_MM;
-use tactus_lab::sim::handheld::ground;
 use tactus_world::person::Hand;
-use tactus_lab::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
 use tactus_world::world::{NotLifted, Setup};
-use tactus_core::sensor::FingerName;
 
 use crate::board::{Display, Emulator, Error, Options, Output};
 

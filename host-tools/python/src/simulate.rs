@@ -6,13 +6,13 @@ use std::sync::{Mutex, PoisonError};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tactus_core::sensor::FingerName;
 use tactus_lab::data::recording::Recording;
 use tactus_lab::data::recordings::RecordingError;
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name, texture_number};
 use tactus_lab::sim::handheld::learn_with;
 use tactus_lab::sim::rig::SimRig;
 use tactus_world::textures::TEXTURES;
-use tactus_core::sensor::FingerName;
 
 use crate::error::Raise as _;
 use crate::features::movement;

@@ -22,21 +22,8 @@ pub(crate) struct Options {
 
 pub(crate) fn docs(options: &Options) -> Result<()> {
     if options.check || options.write {
-        // the picture that a test of the simulator draws
-        let mut test = cargo();
-        test.args([
-            "test",
-            "--package",
-            "tactus-probe",
-            "--lib",
-            "come_out_of_all_fingers",
-        ]);
-        if options.write {
-            test.env("TACTUS_BOOK", "write");
-        }
-        run(&mut test)?;
         // outputs and plots are made from the recordings that one of the book's tests writes
-        let all = ["the_recordings", ""];
+        let all = ["book::the_recordings", "book::"];
         let begin = usize::from(!options.write);
         for filter in &all[begin..] {
             let mut test = cargo();
@@ -45,7 +32,7 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
                 "--package",
                 "tactus-probe",
                 "--test",
-                "book",
+                "documents",
                 filter,
             ]);
             if options.write {

@@ -18,7 +18,7 @@ pub(super) fn from_sources() -> Vec<(&'static str, &'static str, String)> {
         (
             "docs/src/recordings.md",
             "recordings",
-            section("host-tools/src", "The project's own format"),
+            section("host-tools/lab/src", "The project's own format"),
         ),
         (
             "docs/src/store.md",

@@ -2,10 +2,10 @@
 
 use std::task::Poll;
 
-use tactus_link::{Job, LinkError, PushTable, Request, Session, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Phase, Report, Reset};
+use tactus_link::{Job, LinkError, PushTable, Request, Session, Transaction};
 
 use crate::board::{Emulator, Error};
 

@@ -9,22 +9,22 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use tactus_core::wire::bringup::{Measure, Pin, Saw};
+use tactus_core::wire::{Command, Report as Told, Reset};
+use tactus_emulator::board::{Emulator, Options, pins};
+use tactus_emulator::host::talk::{Talk, TalkError};
+use tactus_link::Request;
 use tactus_link::bringup::judge::Finding;
 use tactus_link::bringup::{
     self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Owner, Person, Probe, Report,
     STEPS, Step, Trouble,
 };
-use tactus_link::Request;
 use tactus_world::encoder::Cut;
 use tactus_world::faults::Fault;
 use tactus_world::person::{Hand, Manner};
 use tactus_world::stage::{SUPPLY_V, TRAVEL_MM};
 use tactus_world::wiring::Miswired;
 use tactus_world::world::{Reached, Setup};
-use tactus_core::wire::bringup::{Measure, Pin, Saw};
-use tactus_core::wire::{Command, Report as Told, Reset};
-use tactus_emulator::board::{Emulator, Options, pins};
-use tactus_emulator::host::talk::{Talk, TalkError};
 
 use crate::common::elf_of;
 

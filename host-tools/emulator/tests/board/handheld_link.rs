@@ -3,17 +3,6 @@
 
 use std::path::Path;
 
-use tactus_lab::data::recorder::Recorder;
-use tactus_lab::data::recording::{Recording, Texture};
-use tactus_lab::data::recordings::{RecordingSet, RecordingWriter};
-use tactus_lab::eval::learn::learn;
-use tactus_link::{PushTable, ReadTable, Request};
-use tactus_lab::sim::collection::Collection;
-use tactus_world::flow::HEIGHT_MM;
-use tactus_lab::sim::handheld::ground;
-use tactus_world::parts::PartFault;
-use tactus_world::person::Manner;
-use tactus_world::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::features::{FeatureSet, Measurement, Observation, Slide};
@@ -26,6 +15,17 @@ use tactus_core::wire::{
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::person::Person;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
+use tactus_lab::data::recorder::Recorder;
+use tactus_lab::data::recording::{Recording, Texture};
+use tactus_lab::data::recordings::{RecordingSet, RecordingWriter};
+use tactus_lab::eval::learn::learn;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::handheld::ground;
+use tactus_link::{PushTable, ReadTable, Request};
+use tactus_world::flow::HEIGHT_MM;
+use tactus_world::parts::PartFault;
+use tactus_world::person::Manner;
+use tactus_world::world::Setup;
 
 use crate::common::{elf_of, with_limits_of_change};
 

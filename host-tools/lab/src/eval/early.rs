@@ -319,7 +319,6 @@ pub fn change(looked: &[Looked], round: usize, doubt: f64) -> Change {
 #[cfg(test)]
 mod tests {
     use tactus_core::explorer::Method;
-    use tactus_core::table::MAX_MOVEMENTS;
 
     use super::*;
     use crate::data::recordings::RecordingSet;
@@ -367,7 +366,6 @@ mod tests {
                 sure: told == Told::Sure,
                 told,
                 slides: 2,
-                made: [0; MAX_MOVEMENTS],
                 unknown_like: false,
             },
             seconds: 6.0,

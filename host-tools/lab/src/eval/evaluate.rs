@@ -10,7 +10,7 @@ use tactus_core::explorer::{
 };
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
-use tactus_core::table::{Action, MAX_MOVEMENTS, Table, TableError};
+use tactus_core::table::{Action, Table, TableError};
 
 use crate::eval::experiment::{Experiment, Run};
 use crate::eval::learn;
@@ -85,8 +85,6 @@ pub struct Outcome {
     pub told: Told,
     /// Slides made.
     pub slides: u8,
-    /// How many of them with each movement.
-    pub made: [u8; MAX_MOVEMENTS],
     /// Whether it would have been called unknown, had that been an answer.
     pub unknown_like: bool,
 }
@@ -175,7 +173,6 @@ pub(super) fn play_looking<const N: usize>(
 ) -> Outcome {
     explorer.restart();
     let mut failed = 0;
-    let mut made = [0; MAX_MOVEMENTS];
     let verdict = loop {
         if let Some(verdict) = explorer.verdict() {
             break verdict;
@@ -201,7 +198,6 @@ pub(super) fn play_looking<const N: usize>(
             continue;
         };
         failed = 0;
-        made[usize::from(action.movement)] += 1;
         look(explorer, &run, action, n);
         explorer
             .observe(action, run.shown(movement, n))
@@ -214,7 +210,6 @@ pub(super) fn play_looking<const N: usize>(
         sure: verdict.sure,
         told: verdict.told(),
         slides: explorer.slides(),
-        made,
         unknown_like: explorer.is_unknown(),
     }
 }
@@ -477,7 +472,6 @@ mod tests {
             sure,
             told: if sure { Told::Sure } else { Told::Undecided },
             slides,
-            made: [0; MAX_MOVEMENTS],
             unknown_like: slides == 4,
         };
         let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];

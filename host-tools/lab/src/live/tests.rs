@@ -30,7 +30,7 @@ fn the_trials_that_come_with_the_program_are_what_the_world_gives() {
         assert!(
             *here == make(texture),
             "T{texture}: sensor, features or world were changed on purpose? \
-             TACTUS_TRIALS=write cargo test -p tactus-probe live::"
+             TACTUS_TRIALS=write cargo test -p tactus-lab live::"
         );
         assert_eq!(
             here.movements[0][0].first.len(),

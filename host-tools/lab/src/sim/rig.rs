@@ -163,11 +163,6 @@ impl SimRig {
         &self.performed
     }
 
-    /// How every slide was really made since this was asked for last.
-    pub fn take_performed(&mut self) -> Vec<Performed> {
-        std::mem::take(&mut self.performed)
-    }
-
     /// Sensor slots since power-up.
     pub fn slots(&self) -> u64 {
         self.slot
