@@ -156,19 +156,7 @@ pub fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
-    run: Run<'_>,
-    each: impl FnMut(Action, &Explorer<'_, N>),
-) -> Outcome {
-    play_looking(explorer, confusions, strategy, run, |_, _, _, _| (), each)
-}
-
-/// As [`play_with`]; `look` gets every action with the number of its slide before that is observed.
-pub(super) fn play_looking<const N: usize>(
-    explorer: &mut Explorer<'_, N>,
-    confusions: Option<&Confusions<Vec<Degrees>>>,
-    strategy: Strategy,
     mut run: Run<'_>,
-    mut look: impl FnMut(&mut Explorer<'_, N>, &Run<'_>, Action, usize),
     mut each: impl FnMut(Action, &Explorer<'_, N>),
 ) -> Outcome {
     explorer.restart();
@@ -188,8 +176,7 @@ pub(super) fn play_looking<const N: usize>(
             _ => Default::default(),
         };
         let action = explorer.choose(&expected, run.random.next_u32());
-        let movement = action.movement.into();
-        let Some(n) = run.draw(movement) else {
+        let Some(slide) = run.slide(action.movement.into()) else {
             // as the core explores on a rig: once more, then another movement, and then it ends with what is known
             failed += 1;
             if !explorer.reject(action) || failed == MAX_REJECTED {
@@ -198,9 +185,8 @@ pub(super) fn play_looking<const N: usize>(
             continue;
         };
         failed = 0;
-        look(explorer, &run, action, n);
         explorer
-            .observe(action, run.shown(movement, n))
+            .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
         each(action, explorer);
     };
@@ -243,18 +229,6 @@ pub(super) fn evaluate_by<T: Send>(
     play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
 ) -> Result<Vec<T>, EvaluateError> {
     let learn = |run| experiment.run(run).learn(config.method);
-    evaluate_from(experiment, config, runs, done, learn, play)
-}
-
-/// As [`evaluate_by`], with tables that `learn` makes from the training slides of a run.
-pub(super) fn evaluate_from<T: Send>(
-    experiment: &Experiment,
-    config: Config,
-    runs: u64,
-    done: impl Fn() + Sync,
-    learn: impl Fn(u64) -> Result<Vec<u8>, learn::TableError> + Sync,
-    play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
-) -> Result<Vec<T>, EvaluateError> {
     let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, kept: Kept<'_>, index| {
         let outcome = play(explorer, kept, experiment.run(index));
         done();

@@ -6,7 +6,7 @@ use tactus_core::explorer::Config;
 use crate::eval::courses::courses;
 use crate::eval::evaluate::{EvaluateError, Method, Outcome, Summary, evaluate};
 use crate::eval::experiment::Experiment;
-use crate::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
+use crate::eval::reliability::{Statements, statements};
 use crate::eval::verdicts::Verdicts;
 
 pub use crate::eval::courses::Course;
@@ -36,8 +36,6 @@ pub struct Evaluation {
     pub mean_slides_told: f64,
     /// How often it was right when it said so, by what it said.
     pub reliability: Vec<Statements>,
-    /// What another threshold would change.
-    pub by_threshold: Vec<AtThreshold>,
     /// Figures of explorations that know that the texture is one of the table's, with slides drawn with replacement: the
     /// paper's protocol.
     #[serde(flatten)]
@@ -57,7 +55,7 @@ pub struct Asked {
     pub seed: u64,
     /// How runs end, and choose.
     pub config: Config,
-    /// Whether reliability and other thresholds are wanted: a third of the work.
+    /// Whether reliability is wanted: a third of the work.
     pub with_courses: bool,
 }
 
@@ -103,7 +101,6 @@ pub fn evaluation(
     let names = experiment.names();
     let evaluation = Evaluation {
         reliability: statements(&all, config.threshold),
-        by_threshold: by_threshold(&all, config.threshold),
         method,
         protocol: asked.protocol,
         train_slides: experiment.train_slides(),
