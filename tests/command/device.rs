@@ -1037,7 +1037,7 @@ fn flash_says_what_it_runs_and_what_is_missing() {
     );
     assert_says(
         &complaint(&["flash", "no/such/elf"]),
-        &["no/such/elf", "cargo xtask build"],
+        &["no/such/elf", "cargo xtask size"],
     );
     let temp = tempfile::tempdir().unwrap();
     let elf = temp.path().join("elf");

@@ -17,7 +17,7 @@ Examples:
   cargo xtask bench --pc spectrum    times on this PC of benches with `spectrum` in their name";
 
 /// The image that counts.
-const IMAGE: &str = "tactus-bench";
+const IMAGE: &str = "tactus-silicon";
 /// The one whose load is measured.
 const RIG: &str = "tactus-rig";
 
@@ -26,7 +26,7 @@ pub(crate) struct Options {
     /// For people, or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// Measure the load of the rig's image for another finger alone: analog or mems
+    /// Measure the load of the rig's image with another finger alone: analog or mems
     #[arg(long, value_name = "NAME", conflicts_with = "pc")]
     finger: Option<String>,
     /// Measure times on this PC instead: good for comparing two versions on one PC
@@ -62,14 +62,13 @@ pub(crate) fn gates() -> Result<()> {
     run(&mut program(None)?)
 }
 
-/// Builds the bench image, the rig's, and what counts their instructions.
+/// Builds the image with the bench, the rig's, and what counts their instructions.
 fn program(finger: Option<&str>) -> Result<Command> {
-    let rig = firmware::image_for(RIG, finger)?;
-    let elves = firmware::compile(&[IMAGE, &rig])?;
+    let elves = firmware::compile(&[IMAGE, RIG])?;
     run(&mut emulate::build())?;
     let mut program = emulate::program("bench");
     program.arg("--elf").arg(firmware::image(&elves, IMAGE)?);
-    program.arg("--rig").arg(firmware::image(&elves, &rig)?);
+    program.arg("--rig").arg(firmware::image(&elves, RIG)?);
     if let Some(finger) = finger {
         program.args(["--finger", finger]);
     }

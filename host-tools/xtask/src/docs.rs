@@ -22,38 +22,43 @@ pub(crate) struct Options {
 
 pub(crate) fn docs(options: &Options) -> Result<()> {
     if options.check || options.write {
-        // outputs and plots are made from the recordings that one of the book's tests writes
-        let all = ["book::the_recordings", "book::"];
-        let begin = usize::from(!options.write);
-        for filter in &all[begin..] {
-            let mut test = cargo();
-            test.args([
-                "test",
-                "--package",
-                "tactus-probe",
-                "--test",
-                "documents",
-                filter,
-            ]);
-            if options.write {
-                // one after the other: two of them may write one page
-                test.env("TACTUS_BOOK", "write")
-                    .args(["--", "--test-threads", "1"]);
-            }
-            run(&mut test)?;
-        }
-        return Ok(());
+        return parts(options.write);
     }
     let mdbook = || std::process::Command::new("mdbook");
     ensure!(
         mdbook().arg("--version").output().is_ok(),
         "mdBook is not installed: cargo install mdbook --locked"
     );
+    let pages = target().join("book");
     run(mdbook()
         .arg("build")
         .arg(root().join("docs"))
         .arg("--dest-dir")
-        .arg(target().join("book")))?;
-    println!("{}", target().join("book/index.html").display());
+        .arg(&pages))?;
+    println!("{}", pages.join("index.html").display());
+    Ok(())
+}
+
+/// Checks what is generated, or writes it.
+fn parts(write: bool) -> Result<()> {
+    // outputs and plots are made from the recordings that one of the tests writes
+    let all = ["book::the_recordings", "book::"];
+    for filter in &all[usize::from(!write)..] {
+        let mut test = cargo();
+        test.args([
+            "test",
+            "--package",
+            "tactus-probe",
+            "--test",
+            "documents",
+            filter,
+        ]);
+        if write {
+            // one after the other: two of them may write one page
+            test.env("TACTUS_BOOK", "write")
+                .args(["--", "--test-threads", "1"]);
+        }
+        run(&mut test)?;
+    }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use serde_json::json;
 use tactus_core::features::{Movement, Property};
 
-use super::model::{Report, Rows, axis, cells, movement_name};
+use super::model::{Report, axis, cells, movement_name};
 use crate::chart::matrix::{SHADES, matrix};
 use crate::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, buffer};
 use crate::published::{MOST_USEFUL, TRIALS};

@@ -16,42 +16,32 @@ const SLIDES_BY_HAND: &str = "15";
 
 /// Where they are kept: in the core, which has them as constants.
 pub(crate) const FOLDER: &str = "shared/tables";
-/// The rig's table and the handheld's of each finger, with the finger's name; then that of a probe on an arm, for the only finger that
-/// has an image for it.
+/// The rig's table and the handheld's of each finger, with the finger's name; then that of a probe on an arm, for the
+/// only finger that has an image for it.
 pub(crate) const TABLES: [(&str, &[&str]); 3] = [
     ("biotac", &["factory.tact", "handheld.tact", "arm.tact"]),
     ("analog", &["factory-analog.tact", "handheld-analog.tact"]),
     ("mems", &["factory-mems.tact", "handheld-mems.tact"]),
 ];
 
-/// Makes the tables and writes them, or compares them with those that are committed.
-pub(crate) fn factory(check: bool) -> Result<()> {
+/// Makes the tables, and compares them with those that are committed or writes them.
+pub(super) fn factory(write: bool) -> Result<String> {
     for (finger, names) in TABLES {
         let work = target().join(format!("factory-{}", std::process::id()));
         let made = make(&work, finger, names);
         // half a gigabyte of recordings
         let _ = std::fs::remove_dir_all(&work);
-        take(names, made?, check)?;
-    }
-    Ok(())
-}
-
-fn take(names: &[&str], made: Vec<Vec<u8>>, check: bool) -> Result<()> {
-    for (name, made) in names.iter().zip(made) {
-        let file = root().join(FOLDER).join(name);
-        if check {
-            let committed =
-                std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+        for (name, made) in names.iter().zip(made?) {
+            let file = root().join(FOLDER).join(name);
+            if write {
+                std::fs::write(&file, &made).with_context(|| file.display().to_string())?;
+            }
+            let committed = std::fs::read(&file).with_context(|| file.display().to_string())?;
             same(name, &committed, &made)?;
-            println!("{FOLDER}/{name} is what world {SEED} gives");
-        } else {
-            std::fs::write(&file, &made)
-                .with_context(|| format!("cannot write {}", file.display()))?;
-            println!("{FOLDER}/{name} is written");
+            println!("{}  {FOLDER}/{name}, {} bytes", hash(&made), made.len());
         }
-        println!("bytes    {}\nSHA-256  {}", made.len(), hash(&made));
     }
-    Ok(())
+    Ok(format!("The tables are those of world {SEED}."))
 }
 
 fn make(work: &Path, finger: &str, names: &[&str]) -> Result<Vec<Vec<u8>>> {
@@ -92,7 +82,7 @@ fn same(name: &str, committed: &[u8], made: &[u8]) -> Result<()> {
     ensure!(
         at.is_none() && committed.len() == made.len(),
         "{FOLDER}/{name} is not what world {SEED} gives: {} bytes there, {} made, first difference at byte {}.\n\
-         If simulator, features or table were changed on purpose: cargo xtask factory, and commit the file",
+         If simulator, features or table were changed on purpose: cargo xtask campaign factory -- --write",
         committed.len(),
         made.len(),
         at.unwrap_or(committed.len().min(made.len()))

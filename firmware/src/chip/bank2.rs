@@ -11,7 +11,7 @@ use crate::chip::store_place::{STORE_LENGTH, within};
 pub(crate) struct Bank2(Flash<'static, Async>);
 
 impl Bank2 {
-    pub(in crate::chip) fn new(flash: board::Storage) -> Self {
+    pub(super) fn new(flash: board::Storage) -> Self {
         Self(Flash::new(flash.flash, board::Irqs))
     }
 }

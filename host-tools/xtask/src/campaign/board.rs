@@ -1,19 +1,19 @@
-//! What an exploration on the emulated board says for programs: how it ended, how far its forces were off, and what was lost.
+//! The line of JSON of an exploration on the emulated board: its verdict, its forces, and what was lost.
 
 use serde_json::{Value, json};
 
-/// How a run ended.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// How a run ended; those behind `Right` are listed.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]
 pub(super) enum Ending {
-    Right,
-    Wrong,
-    Undecided,
     /// It has no verdict to give.
     Done,
+    Right,
+    Undecided,
+    Wrong,
     Failed,
 }
 
-/// What one run says.
+/// The report of one run.
 pub(super) struct Explored {
     pub(super) ending: Ending,
     /// In words.
@@ -30,7 +30,7 @@ pub(super) struct Explored {
 const WRONG: [&str; 3] = ["lost", "late", "damaged"];
 
 impl Explored {
-    /// What the line of JSON at the end of its output says; `None` without one.
+    /// Reads the line of JSON at the end of a run's output; `None` without one.
     pub(super) fn of(stdout: &str) -> Option<Self> {
         let said: Value = serde_json::from_str(stdout.lines().last()?).ok()?;
         let verdict = said["verdict"].as_str()?;
@@ -53,8 +53,8 @@ impl Explored {
     }
 }
 
-/// The figures of many: median and worst error of the force of a slide, and sums of what was lost, late and damaged. Nothing of runs
-/// without slides.
+/// The figures of many: median and worst error of the force of a slide, and sums of what was lost, late and damaged.
+/// Nothing of runs without slides.
 pub(super) fn figures<'e>(all: impl Iterator<Item = &'e Explored>) -> Option<Value> {
     let (mut errors, mut sums, mut ends) = (Vec::new(), [0; 3], Vec::new());
     for explored in all {
@@ -80,7 +80,7 @@ pub(super) fn figures<'e>(all: impl Iterator<Item = &'e Explored>) -> Option<Val
 }
 
 /// The middle value, or the mean of the two, and the highest one; `None` of nothing.
-pub(crate) fn median_and_worst(mut values: Vec<f64>) -> Option<(f64, f64)> {
+fn median_and_worst(mut values: Vec<f64>) -> Option<(f64, f64)> {
     values.sort_by(f64::total_cmp);
     let upper = values.get(values.len() / 2)?;
     let lower = values.get((values.len() - 1) / 2)?;
@@ -112,7 +112,8 @@ mod tests {
 
     fn explored(verdict: &str, force_errors: &str, late: u32, end: &str) -> Option<Explored> {
         Explored::of(&format!(
-            "An ELF.\n{{{end}\"verdict\":\"{verdict}\",\"says\":\"Silk?\",\"truth\":\"Wool\",\"force_errors\":{force_errors},\"lost\":1,\"late\":{late},\"damaged\":0}}\n"
+            "An ELF.\n{{{end}\"verdict\":\"{verdict}\",\"says\":\"Silk?\",\"truth\":\"Wool\",\"lost\":1,\
+             \"force_errors\":{force_errors},\"late\":{late},\"damaged\":0}}\n"
         ))
     }
 
