@@ -1,4 +1,4 @@
-//! How often explorations are right when they say so, by the probability that was said.
+//! Reliability of stated probabilities.
 
 use serde::Serialize;
 
@@ -14,16 +14,16 @@ pub struct Statements {
     pub from: f32,
     /// Below this one; 1 is the last of the last.
     pub to: f32,
-    /// How many there were.
+    /// Their number.
     pub count: u64,
-    /// How many of them were right.
+    /// Number of right ones.
     pub right: u64,
-    /// Mean of the probabilities that were said; `None` where none was.
+    /// Mean of the stated probabilities; `None` if there are none.
     pub said: Option<f64>,
 }
 
-/// How often the most probable texture was the right one, by the probability that was said. Slides of one exploration are
-/// not independent.
+/// Share of right names by the stated probability of the most probable texture. Slides of one exploration are not
+/// independent.
 pub fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
     let upper = SAID.iter().skip(1).copied().chain([1.0]);
     let mut bins: Vec<(Statements, f64)> = SAID
@@ -57,7 +57,7 @@ pub fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
     bins.into_iter().map(mean).collect()
 }
 
-/// What users would be told at this threshold.
+/// Shares of the verdicts at this threshold.
 pub fn verdicts(courses: &[Course], threshold: f32) -> Verdicts {
     Verdicts::of(courses.iter().map(|course| {
         let (told, _, texture) = course.told(threshold);
