@@ -176,7 +176,7 @@ const INPUTS: [Input; 6] = [
             file
         },
         reader: Reader::Command(&["device", "log", "replay", "DIR/session.jsonl"]),
-        another_version: (|bytes| replaced(bytes, "\"protocol\":3", "\"protocol\":99")),
+        another_version: (|bytes| replaced(bytes, "\"protocol\":1", "\"protocol\":99")),
         has_end: true,
     },
     Input {

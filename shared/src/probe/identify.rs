@@ -10,7 +10,7 @@ use crate::explorer::{
 };
 use crate::features::PropertySet;
 use crate::rig::{Rig, RigError};
-use crate::table::{Contents, MAX_TEXTURES, Name, PACED, Table};
+use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
@@ -69,9 +69,6 @@ where
             }
             ExplorationStep::Early(ms) => tell(Event::Early(ms)),
             ExplorationStep::Measured(action, measurement, posterior) => {
-                if PACED && let Some(pace) = measurement.pace {
-                    tell(Event::Pace(pace));
-                }
                 tell(Event::SlideReport {
                     slide,
                     action,

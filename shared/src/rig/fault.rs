@@ -108,13 +108,13 @@ faults! {
     /// The finger presses, and P_DC does not say so.
     PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,
         BOTH, ALL, "look whether the finger is up, and turn the lever's knob until it is; check the fingertip and the sensor's P_DC, then reset";
-    /// The arm that moves the finger says nothing any more. New in version 11.
+    /// The arm that moves the finger says nothing any more.
     ArmSilent of "arm", "arm silent", "no word of the arm about what it was asked for in 0.5 s", 502, ARM, ALL,
         "look whether the finger is up, and move the arm away by its own controls; check that its program runs, then reset";
-    /// The arm does not stop when it is to. New in version 11.
+    /// The arm does not stop when it is to.
     ArmRuns of "arm", "arm does not stop", "0.2 s after a stop was demanded the force is over the limit still, or after 2 s the finger still presses", 202, ARM, ALL,
         "press the arm's own emergency stop, and move it away by its controls; then reset";
-    /// The arm did something else than it was asked for. New in version 11.
+    /// The arm did something else than it was asked for.
     ArmOff of "arm", "arm off its order", "it says that it presses and P_DC is more than 2 counts and 10 % off the force; it says that it is lifted and P_DC is not; its slide was 5 % shorter, longer, slower or faster than was asked for, by what it says or by the probe's clock; it was not done in its time; or it says that it cannot", 2,
         ARM, ALL, "look at the arm and the sample, and at what the arm's program says; then reset";
 }

@@ -4,8 +4,8 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::error::StoreError;
 use super::layout::{
-    COMMIT, COMMIT_AT, Correct, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
-    is_committed,
+    COMMIT, COMMIT_AT, Correct, HEADER, LAYOUT, MAGIC, Push, Slot, StoredTable, TABLE_AT, WORD,
+    header, is_committed,
 };
 use super::sectors::Store;
 use crate::CRC32;
@@ -297,20 +297,21 @@ impl<F: NorFlash> Store<F> {
             .iter()
             .map(|word| u32::from_le_bytes(*word));
         let mut word = || words.next().unwrap_or_default();
-        let (_, _, generation, length, crc) = (word(), word(), word(), word(), word());
-        let stored = word();
+        let [magic, layout, generation, length, crc, stored] = core::array::from_fn(|_| word());
         let table = StoredTable {
             offset: start + TABLE_AT,
             length: length as usize,
             crc,
             generation,
         };
-        let good = header(&table);
-        Ok(if bytes == good && table.length <= slot.capacity::<F>() {
+        let (body, _) = bytes.split_at(HEADER - WORD);
+        let computed = CRC32.checksum(body);
+        let is_whole = magic == MAGIC && stored == computed;
+        Ok(if is_whole && layout != LAYOUT {
+            Err(TableError::Version(layout as u16))
+        } else if is_whole && table.length <= slot.capacity::<F>() {
             Ok(table)
         } else {
-            let [.., a, b, c, d] = good;
-            let computed = u32::from_le_bytes([a, b, c, d]);
             Err(TableError::Crc { stored, computed })
         })
     }

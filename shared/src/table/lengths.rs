@@ -14,7 +14,7 @@
 
 use super::encode::{EncodeError, rewrite_with};
 use super::format::{
-    CRC_BYTES, DRIFT, EARLY, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, SLOPES, TWO, array, each,
+    CRC_BYTES, DRIFT, EARLY, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, TWO, array, each,
 };
 use super::limits::Limits;
 use super::sections::{NOVELTY, are_drifts, are_limits, of_drift, of_population};
@@ -23,7 +23,8 @@ use super::view::Table;
 /// Most lengths of a table.
 pub const MAX_LENGTHS: usize = 6;
 const _: () = assert!((MAX_LENGTHS + 1) * MAX_MOVEMENTS <= u8::MAX as usize);
-/// Where the header has the number of textures.
+/// Where the header has the length of the table, and where the number of textures behind it.
+const LENGTH_FIELD: usize = 8;
 const COUNT: usize = 12;
 
 /// What slides of one length say, for [`with_lengths`].
@@ -159,8 +160,7 @@ impl<'a> Table<'a> {
                 .rest
                 .split_at_checked(drift.unwrap_or(0))
                 .unwrap_or_default();
-            let fits = same(0, 4)
-                && same(6, 8)
+            let fits = same(0, LENGTH_FIELD)
                 && same(COUNT, HEADER)
                 && same(HEADER, self.layout().whitenings)
                 && length.ms > longest
@@ -189,10 +189,5 @@ impl<'a> Table<'a> {
                 at = begin + contents.len();
                 (kind == LENGTH).then_some(begin + MS + trials)
             })
-    }
-
-    /// Whether it has the section of speeds, whether or not this build knows them.
-    pub(super) fn has_slopes(&self) -> bool {
-        self.section(SLOPES).is_some()
     }
 }
