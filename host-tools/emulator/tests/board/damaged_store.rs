@@ -1,11 +1,11 @@
-//! Stores that are damaged, in the golden store of `tests/formats.rs`: a table of the factory and a newer one, and a record of each kind.
+//! Stores that are damaged, in the golden store of `tests/core/formats.rs`: a table of the factory and a newer one, and a record of each kind.
 
 use std::path::Path;
 
 use embassy_futures::block_on;
-use tactus::link::{PushTable, ReadTable, Request};
-use tactus::sim::collection::Collection;
-use tactus::sim::flash::{RamFlash, SECTOR};
+use tactus_link::{PushTable, ReadTable, Request};
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{Store, StoreError};

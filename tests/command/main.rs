@@ -1,0 +1,12 @@
+//! Tests of the command `tactus` as a person or a script uses it, and of the examples.
+
+mod bad_input;
+mod command_line;
+mod convert;
+mod device;
+mod examples;
+mod kills;
+mod opened;
+mod output;
+mod study;
+mod verdicts;
