@@ -1,5 +1,5 @@
-//! Tables, stores, messages, logs and recordings of version 1: each has the bytes of its golden file, and any other version is refused
-//! with a word on what to do. `docs/src/wire.md` says when golden files may be written anew, by `TACTUS_GOLDEN=write`.
+//! Tables, stores, messages, logs and recordings of version 1: each has the bytes of its golden file, and any other version
+//! is refused with a word on what to do. `docs/src/wire.md` says when golden files may be written anew, by `TACTUS_GOLDEN=write`.
 
 use std::fmt::Debug;
 use std::fs;
@@ -331,7 +331,8 @@ fn tables_of_other_versions_are_refused() {
             assert_eq!(
                 why.to_string(),
                 format!(
-                    "version {version}, and this program reads version 1: learn the table anew, or use the program that wrote it"
+                    "version {version}, and this program reads version 1: learn the table anew, or use the program \
+                     that wrote it"
                 )
             );
         }
@@ -566,7 +567,8 @@ fn a_log_of_other_versions_is_refused() {
         assert_eq!(
             why.to_string(),
             format!(
-                "written with version {version} of the messages, this program reads version 1: replay it with the tactus that wrote it"
+                "written with version {version} of the messages, this program reads version 1: replay it with the \
+                 tactus that wrote it"
             )
         );
     }

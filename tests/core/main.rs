@@ -13,7 +13,6 @@ mod formats;
 mod fused_recipe;
 mod golden;
 mod high_force;
-mod objective;
 mod oracle;
 mod pace;
 mod page;

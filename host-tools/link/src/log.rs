@@ -1,6 +1,6 @@
 //! Logs of sessions, which `tactus device --log` writes: a line of JSON for every command and every report.
 //!
-//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":1,"port":"/dev/ttyACM0"}}`. Each other one is
+//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":1,"port":"/dev/ttyACM0"}}`. Each other is
 //! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
 //! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
@@ -128,7 +128,8 @@ pub enum LogError {
     },
     /// Messages of another version.
     #[error(
-        "written with version {0} of the messages, this program reads version {PROTOCOL}: replay it with the tactus that wrote it"
+        "written with version {0} of the messages, this program reads version {PROTOCOL}: replay it with the tactus \
+         that wrote it"
     )]
     Protocol(u8),
     /// The file cannot be read.

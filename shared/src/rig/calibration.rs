@@ -56,8 +56,8 @@ impl RigCalibration {
     /// Bytes of a stored record.
     pub const BYTES: usize = 64;
 
-    /// Returns the record as it is stored: nine f32, the date, the day on which the accelerometer was turned over, the serial number,
-    /// and a CRC-32 of these; little-endian. The highest bit of the date is set where P_DC in the air is known.
+    /// Returns the record as it is stored: nine f32, the date, the day on which the accelerometer was turned over, the serial
+    /// number, and a CRC-32 of these; little-endian. The highest bit of the date is set where P_DC in the air is known.
     #[inline(never)]
     pub fn to_bytes(&self) -> Vec<u8, { Self::BYTES }> {
         let air = if self.air_known { Self::AIR_KNOWN } else { 0 };
@@ -146,9 +146,7 @@ impl RigCalibration {
             return Err(RigCalibrationError::Pressure(CalibrationError::Scale));
         }
         let mg = &self.pressure.pac_pa_per_count;
-        // in images of other fingers it is not used
-        let turns = cfg!(any(feature = "turns", test));
-        if turns && self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
+        if self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
             return Err(RigCalibrationError::Turned);
         }
         let (standstill, per_mm_s) = self.unloaded_a;

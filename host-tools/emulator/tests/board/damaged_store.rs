@@ -1,4 +1,5 @@
-//! Stores that are damaged, in the golden store of `tests/core/formats.rs`: a table of the factory and a newer one, and a record of each kind.
+//! Stores that are damaged. Each begins as the golden store of `tests/core/formats.rs`: a table of the factory, a newer one,
+//! and a record of each kind.
 
 use std::path::Path;
 

@@ -77,7 +77,8 @@ pub enum ContentError {
     // recorded slides
     /// They are of another version of the format.
     #[error(
-        "version {0}, and this program reads version {VERSION}: write the recordings anew, or use the program that wrote them"
+        "version {0}, and this program reads version {VERSION}: write the recordings anew, or use the program \
+         that wrote them"
     )]
     Version(u32),
     /// Start and end of the steady part, s.

@@ -94,7 +94,7 @@ pub fn learn(
 /// What a fused table is to expect.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Expected {
-    /// How fingers and samples change; `None` for a table that has neither drift nor limits, and decides by its means alone.
+    /// How fingers and samples change; `None` for a table without drift and limits, which decides by its means alone.
     pub drift: Option<Drift>,
     /// Share of known textures that may be taken for new ones.
     pub false_alarm: f32,

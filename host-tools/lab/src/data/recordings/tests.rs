@@ -253,7 +253,8 @@ fn own_manifest_errors_name_line_and_column() {
             "biotac,,,2",
             [
                 "manifest.csv:2: column version",
-                "version 2, and this program reads version 1: write the recordings anew, or use the program that wrote them",
+                "version 2, and this program reads version 1: write the recordings anew, or use the program \
+                 that wrote them",
             ],
         ),
     ] {
