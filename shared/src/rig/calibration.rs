@@ -7,7 +7,7 @@ use super::turning;
 use crate::CRC32;
 use crate::sensor::pressure::{Calibration, CalibrationError};
 
-/// What was measured of one rig, on which day, and with which sensor.
+/// Measured constants of one rig, with their dates and the sensor they belong to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RigCalibration {
     /// Fingertip: zero and counts per newton.
@@ -16,14 +16,15 @@ pub struct RigCalibration {
     pub unloaded_a: (f32, f32),
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
-    /// Day on which the force per count was measured, as 20261121, [`RigCalibration::UNDATED`] where nobody knew the day, 0 if
-    /// it was not.
+    /// Day on which the force per count was measured, as 20261121; [`RigCalibration::UNDATED`] if the day is unknown,
+    /// 0 if it was not measured.
     pub date: u32,
-    /// Whether P_DC in the air is this finger's, and no default.
+    /// True if P_DC in the air was measured with this finger and is no default.
     pub air_known: bool,
-    /// Day on which the accelerometer was turned over, and `pressure.pac_pa_per_count` with it measured, in mg; as `date`.
+    /// Day on which the accelerometer was turned over and `pressure.pac_pa_per_count` was measured with it, in mg;
+    /// format as `date`.
     pub turned: u32,
-    /// Serial number of the sensor, as the sensor says it.
+    /// Serial number of the sensor, as the sensor sends it.
     pub serial: [u8; 16],
 }
 
@@ -39,7 +40,7 @@ impl RigCalibration {
         (self.date != 0).then_some(self.date)
     }
 
-    /// This, with P_DC in the air as it was measured, counts.
+    /// The calibration with a measured P_DC in the air, counts.
     #[must_use]
     pub fn with_air(mut self, counts: f32) -> Self {
         self.pressure.pdc_no_contact = counts;
@@ -76,7 +77,7 @@ impl RigCalibration {
     /// Returns the record in `bytes`, checked.
     ///
     /// # Errors
-    /// [`RigCalibrationError::Damaged`], or what [`RigCalibration::check`] says.
+    /// [`RigCalibrationError::Damaged`], or the error of [`RigCalibration::check`].
     #[inline]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RigCalibrationError> {
         let whole: &[u8; Self::BYTES] =
@@ -133,7 +134,7 @@ impl RigCalibration {
         ]
     }
 
-    /// Checks a record before a motor is moved by it.
+    /// Checks a record before it moves a motor.
     ///
     /// # Errors
     /// See [`RigCalibrationError`].
@@ -158,7 +159,7 @@ impl RigCalibration {
     }
 }
 
-/// Why a calibration is not used.
+/// Reasons for refusing a calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum RigCalibrationError {
     /// The fingertip's constants.
@@ -176,7 +177,7 @@ pub enum RigCalibrationError {
     /// The points do not lie on a line: R^2 below 0.99.
     #[error("the points do not lie on a line (R^2 below 0.99): measure again")]
     NoLine,
-    /// What a count of an accelerometer is worth.
+    /// The value of an accelerometer's count.
     #[error("an accelerometer's count is within a tenth of 0.976 mg: turn the finger over again")]
     Turned,
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use clap::ValueEnum as _;
 use tactus_core::explorer;
-use tactus_lab::eval::evaluation::{Asked, Evaluation, evaluation};
+use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
 use tactus_lab::eval::experiment::Protocol;
 use tactus_lab::eval::show::count;
 use tactus_study::pictures::evaluation::figures;
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     // a program gets what the pictures show
     let with_courses = canvas.is_some() || args.format == Format::Json;
-    let asked = Asked {
+    let asked = EvaluationRequest {
         method: args.method,
         protocol,
         runs: args.runs(),

@@ -7,7 +7,7 @@ use tactus_core::explorer::Method;
 use tactus_core::wire::{Event, Identify, Phase};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::milestones::Milestones;
-use tactus_emulator::host::under_finger::{self, Known};
+use tactus_emulator::host::under_finger::{self, FirmwareData};
 use tactus_lab::eval::learn::know_lengths;
 use tactus_lab::sim::collection::Collection;
 use tactus_world::faults::Fault;
@@ -15,14 +15,14 @@ use tactus_world::faults::Fault;
 use crate::common::{boot, elf};
 
 /// A world of so many textures that holds this one, and what is learned of it with and without lengths.
-fn world(seed: u64, texture: u8, among: u8) -> (Collection, [Known; 2]) {
+fn world(seed: u64, texture: u8, among: u8) -> (Collection, [FirmwareData; 2]) {
     let collection = Collection {
         seed,
         textures: Collection::spread(texture, among),
         trials: 5,
     };
     let early = under_finger::simulated_early(&collection, Method::Fused, || ()).unwrap();
-    let whole = Known {
+    let whole = FirmwareData {
         table: know_lengths(&early.table, &[]).unwrap(),
         ..early.clone()
     };
@@ -41,7 +41,7 @@ struct Seen {
     seconds_to_verdict: f64,
 }
 
-fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
+fn seen(elf: &Path, world: &Collection, known: &FirmwareData, texture: u8) -> Seen {
     let unknown = under_finger::mounted(world, texture, 7);
     let mut talk = boot(elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
