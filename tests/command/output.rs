@@ -307,8 +307,8 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
         let named: Vec<String> = text
             .lines()
             .map(|line| {
-                line.strip_suffix(",,,,biotac,,")
-                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,,"))
+                line.strip_suffix(",,,,biotac,,,1")
+                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,,,1"))
             })
             .collect();
         std::fs::write(&manifest, named.join("\n")).unwrap();
