@@ -4,9 +4,6 @@
 use std::path::Path;
 
 use embassy_futures::block_on;
-use tactus_link::{PushTable, ReadTable, Request};
-use tactus_lab::sim::collection::Collection;
-use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{Store, StoreError};
@@ -15,6 +12,9 @@ use tactus_core::wire::{Command, Event, Failure, MemoryError, PART};
 use tactus_emulator::board::Options;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::mounted;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::flash::{RamFlash, SECTOR};
+use tactus_link::{PushTable, ReadTable, Request};
 
 use crate::common::{elf, unpacked, with_limits_of_change};
 

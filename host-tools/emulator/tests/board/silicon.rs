@@ -239,13 +239,13 @@ fn a_stack_that_overflows_is_stopped_at_its_guard() {
                 board.write(NOWHERE, &[0xFF, 0xB4, 0xFD, 0xE7]).unwrap();
                 let (task, _) = board.symbol("tactus_check_in").unwrap();
                 let task = task & !1;
-                let whole = board.read(task, 8).unwrap();
                 // ldr.w pc, [pc], and the address behind; nop first, where it would not be a multiple of 4
                 let mut code = vec![0xDF, 0xF8, 0x00, 0xF0];
                 if !task.is_multiple_of(4) {
                     code.splice(0..0, [0x00, 0xBF]);
                 }
                 code.extend((NOWHERE as u32 | 1).to_le_bytes());
+                let whole = board.read(task, code.len() as u64).unwrap();
                 board.write(task, &code).unwrap();
                 board.run_ms(10).unwrap();
                 board.write(task, &whole).unwrap();
