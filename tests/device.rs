@@ -27,7 +27,7 @@ use tactus::sim::collection::{Collection, calibrated, plain_name, texture_name};
 use tactus::sim::flash::{RamFlash, SECTOR, TABLE};
 use tactus::sim::probe::{self, Host};
 use tactus::sim::rig::SimRig;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
 use tactus_core::probe::seams::{Panel, RigHandle as _};

@@ -11,7 +11,7 @@ use tactus::sim::press::{Bench, FORCE_LIMIT_N, Press, Trouble};
 use tactus::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
 use tactus::sim::rig::SimRig;
 use tactus::sim::world::Setup;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Properties, Property, PropertySet};
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Refused, RigError};
@@ -57,7 +57,7 @@ impl Host for Heard {
 }
 
 fn ask(probe: &mut SimProbe<'_, Heard>, command: Command) -> Result<(), Box<Failure>> {
-    block_on(probe.perform::<Plain>(&command)).map_err(Box::new)
+    block_on(probe.perform(&command)).map_err(Box::new)
 }
 
 fn train() -> Command {

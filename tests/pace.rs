@@ -5,7 +5,6 @@ use tactus::eval::learn;
 use tactus::sim::collection::Collection;
 use tactus::sim::handheld::slides;
 use tactus::sim::person::Manner;
-use tactus_core::dsp::Plain;
 use tactus_core::explorer::{Method, Told};
 use tactus_core::features::Observation;
 use tactus_core::handheld::{ASK_AFTER, FEATURES, Judgement, MOVEMENT, judge_at_most};
@@ -82,7 +81,7 @@ impl Counts {
 /// Explores one texture.
 fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
     let judged = |n: usize| {
-        judge_at_most::<Plain>(table, &slides[..n], None, None, ASK_AFTER)
+        judge_at_most(table, &slides[..n], None, None, ASK_AFTER)
             .unwrap()
             .0
     };

@@ -1,9 +1,7 @@
 //! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its converter's motor current, its
 //! last acts, and the core's kernels in its assembly. What its family does in its own way is in the file of the family.
-mod confusion_kernel;
 mod critical_section;
 pub(crate) mod current;
-mod decision_kernels;
 mod dsp_kernels;
 #[cfg(feature = "nucleo-f429zi")]
 mod f4;
@@ -20,7 +18,7 @@ pub(crate) mod thread;
 mod transform_kernel;
 pub(crate) mod watchdog;
 
-pub(crate) use dsp_kernels::Chip;
+pub(crate) use dsp_kernels::KERNELS;
 #[cfg(feature = "nucleo-f429zi")]
 use f4 as family;
 #[cfg(feature = "nucleo-f767zi")]

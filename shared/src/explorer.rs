@@ -9,14 +9,16 @@ mod confusions;
 #[cfg(any(test, feature = "early"))]
 mod early;
 mod episode;
-pub mod kernels;
+mod gaussians;
 mod likelihoods;
+mod likeness;
 mod novelty;
 #[cfg(any(test, feature = "timed"))]
 mod objective;
-pub mod overlap;
+mod overlap;
 mod paced;
 mod posterior;
+mod spread;
 mod student;
 mod verify;
 mod whitened;
@@ -28,7 +30,6 @@ pub use confusions::{Confusions, Degrees};
 #[cfg(any(test, feature = "early"))]
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
-pub use kernels::Kernels;
 #[cfg(any(test, feature = "timed"))]
 pub use objective::{Objective, SlideTime};
 pub use posterior::{Explorer, Told, Verdict};

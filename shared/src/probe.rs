@@ -16,7 +16,6 @@ mod transfer;
 
 pub use calibrate::restore;
 pub use dispatch::{Probe, Turn, receive, turn};
-pub(crate) use identify::consider_fused;
 pub use identify::identify;
 pub use memory::Memory;
 pub use status::{RigState, TableInUse, Watch};

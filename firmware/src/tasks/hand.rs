@@ -15,7 +15,7 @@ use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
 use tactus_core::handheld::jobs::{self, Outcome};
-use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, Small, TICKS_HZ, draw};
+use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
@@ -346,7 +346,7 @@ pub(crate) async fn hand(
     let mut memory = Memory::new(store, MappedTable, FACTORY, flash::buffer());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
-    let mut handheld = Handheld::<Small>::new(plan, textures);
+    let mut handheld = Handheld::new(plan, textures);
     if let Some(why) = memory.trouble() {
         handheld.memory_failed(jobs::words(why));
     }

@@ -18,7 +18,7 @@ use super::link::{BUSY, JOBS, TABLE};
 use super::outbox::tell;
 use super::rig_handle::ServoHandle;
 use crate::board::{self, Finger};
-use crate::chip::Chip;
+use crate::chip::KERNELS;
 use crate::chip::flash::{self, MappedTable};
 
 /// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
@@ -63,7 +63,7 @@ pub(crate) async fn probe(
         rig,
         memory: Memory::new(store, MappedTable, FACTORY, flash::buffer()),
         events: Told(Output::new(go.same, Level::Low, Speed::Low)),
-        plan: PLAN.init_with(Plan::new),
+        plan: PLAN.init_with(|| Plan::with(KERNELS)),
     };
     probe.memory.reload(&mut probe.events).await;
     // a lever that does not go up must not be asked again before somebody has looked at it
@@ -77,7 +77,7 @@ pub(crate) async fn probe(
         let request = JOBS.receive().await;
         drive::progress();
         BUSY.store(true, Relaxed);
-        probe.serve::<Chip>(&request).await;
+        probe.serve(&request).await;
     }
 }
 

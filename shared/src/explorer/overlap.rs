@@ -7,7 +7,7 @@ const STEPS: usize = 31;
 /// Coefficients, from the constant one on, of what 2 to the power of -(5 z / 31)^2 is around each whole z from -32 on, and
 /// towards the next one away from 0: the overlap of two densities of the same width, at most 5e-5 off. From 31 on, beyond 25
 /// octaves, it is half of the last place of a number near 1: 0. The fourth number is nothing: 16 bytes are easily found.
-pub const OVERLAP: [[f32; 4]; 64] = overlap();
+pub(super) const OVERLAP: [[f32; 4]; 64] = overlap();
 
 #[expect(
     clippy::indexing_slicing,

@@ -8,8 +8,6 @@ use super::judge::{Judgement, MOVEMENT};
 use super::screen::{About, Screen};
 use super::speed::Moved;
 use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
-use crate::dsp;
-use crate::explorer::Kernels;
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
@@ -88,11 +86,11 @@ pub trait Hand {
 }
 
 /// A rig that is a person with a probe in the hand.
-pub struct ByHand<'p, H, K> {
+pub struct ByHand<'p, H> {
     /// Its parts.
     pub hand: H,
     /// What the person sees.
-    pub handheld: Handheld<'p, K>,
+    pub handheld: Handheld<'p>,
     calibration: RigCalibration,
     skin: SkinCare,
     watch: Watch,
@@ -109,9 +107,9 @@ pub struct ByHand<'p, H, K> {
     serves: bool,
 }
 
-impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
+impl<'p, H: Hand> ByHand<'p, H> {
     /// A probe that was just switched on, with a fingertip of these constants.
-    pub fn new(hand: H, handheld: Handheld<'p, K>, calibration: RigCalibration) -> Self {
+    pub fn new(hand: H, handheld: Handheld<'p>, calibration: RigCalibration) -> Self {
         let mut by_hand = Self {
             hand,
             handheld,
@@ -242,7 +240,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
     }
 }
 
-impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
+impl<H: Hand> Rig for ByHand<'_, H> {
     type Error = RigError;
 
     fn measures(&self) -> PropertySet {
@@ -251,7 +249,7 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
             .collect()
     }
 
-    async fn perform<D: dsp::Kernels>(&mut self, slide: &mut Slide<'_, D>) -> Result<(), RigError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), RigError> {
         if slide.movement() != MOVEMENT {
             return Err(RigError::NotByHand);
         }
@@ -277,7 +275,7 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
     }
 }
 
-impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
+impl<H: Hand> RigHandle for ByHand<'_, H> {
     fn state(&self) -> RigState {
         // without words nobody knows what the finger does
         let heard = self.handheld.listens();
@@ -458,15 +456,12 @@ impl<E: Events> Events for Shown<E> {
 }
 
 /// The probe in the hand of a person.
-pub type HandProbe<'m, H, K, F, B, E> = Probe<'m, ByHand<'m, H, K>, F, B, Shown<E>>;
+pub type HandProbe<'m, H, F, B, E> = Probe<'m, ByHand<'m, H>, F, B, Shown<E>>;
 
 /// A hundredth of a second of the person's own use, and what it has to be done with the table; `log` hears that.
-pub async fn step<H, K, F, B, E>(
-    probe: &mut HandProbe<'_, H, K, F, B, E>,
-    log: impl FnMut(Outcome<'_>),
-) where
+pub async fn step<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, log: impl FnMut(Outcome<'_>))
+where
     H: Hand,
-    K: Kernels,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -525,10 +520,9 @@ fn asked(command: &Command) -> (Asked, Option<Name>) {
 }
 
 /// Serves a request of the host, and shows what came of it.
-pub async fn serve<H, K, F, B, E>(probe: &mut HandProbe<'_, H, K, F, B, E>, request: &Request)
+pub async fn serve<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, request: &Request)
 where
     H: Hand,
-    K: Kernels,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -539,7 +533,7 @@ where
     probe.rig.serves = true;
     probe.events.told = false;
     let before = probe.memory.table().ok().map(|table| table.crc());
-    let done = probe.perform::<K>(&request.command).await;
+    let done = probe.perform(&request.command).await;
     let table = probe.memory.table().ok();
     let after = table.map(|table| (table.crc(), table.textures()));
     let rig = &mut probe.rig;

@@ -3,10 +3,9 @@
 use heapless::Vec;
 
 use crate::explorer::{
-    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
+    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
-use crate::probe::consider_fused;
 use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
 /// What a person is asked to do: half a newton, 25 mm/s.
@@ -72,7 +71,7 @@ pub enum JudgeError {
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
-pub fn judge<K: Kernels>(
+pub fn judge(
     table: Table<'_>,
     slides: &[Observation],
     reference: Option<u16>,
@@ -82,14 +81,14 @@ pub fn judge<K: Kernels>(
         Some(_) => ASK_AFTER,
         None => MAX_SLIDES,
     };
-    judge_at_most::<K>(table, slides, reference, false_alarm, most)
+    judge_at_most(table, slides, reference, false_alarm, most)
 }
 
 /// The same where `most` slides, up to 255, are the last ones, sure or not.
 ///
 /// # Errors
 /// See [`judge`].
-pub fn judge_at_most<K: Kernels>(
+pub fn judge_at_most(
     table: Table<'_>,
     slides: &[Observation],
     reference: Option<u16>,
@@ -104,9 +103,11 @@ pub fn judge_at_most<K: Kernels>(
         verify: reference.is_some(),
         ..Config::default()
     };
-    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    let among = reference.as_slice();
-    consider_fused(&mut explorer, PropertySet::default(), config, among)
+    let mut explorer = Explorer::<'_, MAX_TEXTURES>::empty(table);
+    let all = 0..table.textures();
+    let candidates = reference.map_or(all, |texture| texture..texture.saturating_add(1));
+    explorer
+        .consider(PropertySet::default(), config, candidates)
         .map_err(JudgeError::Table)?;
     let action = Action {
         movement: movement(&table).ok_or(JudgeError::Movement)?,

@@ -5,10 +5,7 @@ use heapless::Vec;
 
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::{
-    self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, Kernels, Method,
-};
-use crate::features::PropertySet;
+use crate::explorer::{self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError};
 use crate::rig::{Rig, RigError};
 use crate::table::{Contents, MAX_TEXTURES, Name, PACED, Table};
 use crate::up_to;
@@ -20,7 +17,7 @@ use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 ///
 /// # Errors
 /// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
-pub async fn identify<R, K>(
+pub async fn identify<R>(
     wanted: &Identify,
     config: Config,
     rig: &mut R,
@@ -30,7 +27,6 @@ pub async fn identify<R, K>(
 ) -> Result<EpisodeSummary, Failure>
 where
     R: Rig<Error = RigError>,
-    K: Kernels,
 {
     let contents = table.contents();
     if config.verify {
@@ -41,14 +37,14 @@ where
             return Err(Failure::NoLimits);
         }
     }
-    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    if K::ONLY_FUSED {
-        consider_fused(&mut explorer, rig.measures(), config, &wanted.among)
-    } else {
-        let candidates = candidates(&wanted.among, table.textures());
-        explorer.consider(rig.measures(), config, candidates)
-    }
-    .map_err(Failure::Explorer)?;
+    let mut explorer = Explorer::<'_, MAX_TEXTURES>::empty(table);
+    explorer
+        .consider(
+            rig.measures(),
+            config,
+            candidates(&wanted.among, table.textures()),
+        )
+        .map_err(Failure::Explorer)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
     let verdict = explore(
@@ -115,29 +111,6 @@ where
 fn candidates(among: &[u16], textures: u16) -> impl Iterator<Item = u16> {
     let all = if among.is_empty() { 0..textures } else { 0..0 };
     among.iter().copied().chain(all)
-}
-
-/// Prepares an empty explorer for a table with whitened features; what the other methods take is left out of the code.
-///
-/// # Errors
-/// [`ExplorerError::Method`]: another method is wanted; and those of [`Explorer::among`].
-#[inline(never)]
-pub(crate) fn consider_fused<K: Kernels>(
-    explorer: &mut Explorer<'_, MAX_TEXTURES, K>,
-    measured: PropertySet,
-    config: Config,
-    among: &[u16],
-) -> Result<(), ExplorerError> {
-    if config.method != Method::Fused {
-        return Err(ExplorerError::Method(config.method));
-    }
-    let config = Config {
-        // known while compiling
-        method: Method::Fused,
-        ..config
-    };
-    let candidates = candidates(among, explorer.table().textures());
-    explorer.consider(measured, config, candidates)
 }
 
 /// The event of a verdict.

@@ -16,10 +16,8 @@ pub const fn mean_step(property: Property) -> f32 {
     }
 }
 
-/// What one property of a texture is expected to be (eq. 4). The order of the fields is fixed, for kernels that are
-/// not written in Rust.
+/// The expectation of one property of a texture (eq. 4).
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[repr(C)]
 pub struct Gaussian {
     /// Mean, in the unit of the property.
     pub mean: f32,
@@ -62,18 +60,8 @@ impl<'t> Gaussians<'t> {
         })
     }
 
-    /// The bytes of the cells, the first at the beginning, and how far one is from the next.
-    pub fn bytes(&self) -> (&'t [u8], usize) {
-        (self.cells, self.stride)
-    }
-
-    /// One step of the means, in the unit of the property.
-    pub fn step(&self) -> f32 {
-        self.step
-    }
-
-    /// What makes steps of the means by steps of the standard deviation numbers whose square is half of that of standard
-    /// deviations, in Q16.
+    /// The factor that makes steps of the means by steps of the standard deviation numbers whose square is half of that of
+    /// standard deviations, in Q16.
     pub fn scale(&self) -> f32 {
         /// Square root of 2^16 / 2.
         const HALF_Q16: f32 = 181.019_34;

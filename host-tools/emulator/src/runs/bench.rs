@@ -25,7 +25,7 @@ use tactus_core::sensor::FingerName;
 use self::counter::Bench;
 use self::error::BenchError;
 use self::gates::{GATES, gate};
-use self::inputs::{SLIDE, Wanted, corners, extremes, observed, of_gates, slide, synthetic};
+use self::inputs::{SLIDE, Wanted, extremes, observed, of_gates, slide, synthetic};
 use self::on_the_rig::on_the_rig;
 use self::plot::{Curve, draw};
 use self::row::{Row, print};
@@ -88,7 +88,6 @@ fn count(args: &Args) -> Result<bool, BenchError> {
     if args.growth {
         return growth(&mut bench, args.plot.as_deref());
     }
-    corners(&mut bench)?;
     extremes(&mut bench)?;
     if text {
         bench = Bench::start(&args.firmware.elf, true)?;

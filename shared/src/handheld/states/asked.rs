@@ -2,7 +2,6 @@
 //! those of the person's own use; what was measured is the host's.
 
 use super::{Answer, Asked, Handheld, Page};
-use crate::explorer::Kernels;
 use crate::features::Slide;
 use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
@@ -15,7 +14,7 @@ use crate::rig::{self, Fault};
 use crate::table::Name;
 use crate::wire::Prompt;
 
-impl<'p, K: Kernels> Handheld<'p, K> {
+impl<'p> Handheld<'p> {
     fn ask(&mut self, asked: Asked, page: Page) {
         self.clear_episode();
         self.job = None;
@@ -155,7 +154,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The slide that was good last, until the finger is pressed again.
-    pub fn slide(&self) -> &Slide<'p, K> {
+    pub fn slide(&self) -> &Slide<'p> {
         self.touch.slide()
     }
 

@@ -2,7 +2,7 @@
 
 #[cfg(any(test, feature = "early"))]
 use crate::explorer::most_doubt;
-use crate::explorer::{Explorer, Kernels, ObserveError};
+use crate::explorer::{Explorer, ObserveError};
 use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::Rig;
 #[cfg(any(test, feature = "early"))]
@@ -21,11 +21,11 @@ pub(super) struct Length {
 
 /// Makes a slide; the length at which it ended, if the verdict was certain before its end.
 #[cfg(any(test, feature = "early"))]
-pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
+pub(super) async fn perform<R: Rig, const N: usize>(
     rig: &mut R,
-    explorer: &mut Explorer<'_, N, K>,
+    explorer: &mut Explorer<'_, N>,
     action: Action,
-    slide: &mut Slide<'_, K>,
+    slide: &mut Slide<'_>,
 ) -> Result<Option<Length>, R::Error> {
     let Some(most) = most_doubt(explorer.config().method) else {
         return rig.perform(slide).await.map(|()| None);
@@ -33,7 +33,7 @@ pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
     let mut lengths = (1..).zip(explorer.table().lengths_ms());
     let mut next = lengths.next();
     let mut ended = None;
-    let enough = &mut |slide: &mut Slide<'_, K>| {
+    let enough = &mut |slide: &mut Slide<'_>| {
         let Some((n, ms)) = next.filter(|(_, ms)| slide.samples() >= samples_in(*ms)) else {
             return false;
         };
@@ -53,19 +53,19 @@ pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
 }
 
 #[cfg(not(any(test, feature = "early")))]
-pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
+pub(super) async fn perform<R: Rig, const N: usize>(
     rig: &mut R,
-    _explorer: &mut Explorer<'_, N, K>,
+    _explorer: &mut Explorer<'_, N>,
     _action: Action,
-    slide: &mut Slide<'_, K>,
+    slide: &mut Slide<'_>,
 ) -> Result<Option<Length>, R::Error> {
     rig.perform(slide).await.map(|()| None)
 }
 
 /// What a slide says that ended at this length, or at its end.
 #[cfg(any(test, feature = "early"))]
-pub(super) fn measure<K: Kernels>(
-    mut slide: Slide<'_, K>,
+pub(super) fn measure(
+    mut slide: Slide<'_>,
     length: Option<Length>,
 ) -> Result<Measurement, SlideError> {
     match length {
@@ -75,16 +75,16 @@ pub(super) fn measure<K: Kernels>(
 }
 
 #[cfg(not(any(test, feature = "early")))]
-pub(super) fn measure<K: Kernels>(
-    slide: Slide<'_, K>,
+pub(super) fn measure(
+    slide: Slide<'_>,
     _length: Option<Length>,
 ) -> Result<Measurement, SlideError> {
     slide.finish()
 }
 
 /// Takes in a slide that ended at this length, or at its end.
-pub(super) fn observe<const N: usize, K: Kernels>(
-    explorer: &mut Explorer<'_, N, K>,
+pub(super) fn observe<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
     action: Action,
     length: Option<Length>,
     slide: &Measurement,
