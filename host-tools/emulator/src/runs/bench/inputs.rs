@@ -10,7 +10,7 @@ use tactus::data::recordings::RecordingSet;
 use tactus::eval::learn;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{
-    FeatureSet, Movement, Observation, Properties, Property, PropertySet,
+    FeatureSet, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet,
 };
 use tactus_core::table::{Action, Contents, Table};
 
