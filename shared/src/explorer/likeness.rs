@@ -65,7 +65,7 @@ struct Likeness {
     /// The degree of confusion is 2 to the power of less the distance times this, of which the upper half is in Q18.
     octaves: u32,
     /// Means that far apart, an even number, are not confused: 25 octaves, as with Gaussians.
-    far: u32,
+    far: u64,
 }
 
 impl Likeness {
@@ -76,7 +76,7 @@ impl Likeness {
         Self {
             fewer,
             octaves: 2 * LOG2_E / (n + 1) * n,
-            far: (far * (n + 1) / n) & !1,
+            far: u64::from(far * (n + 1) / n & !1),
         }
     }
 
@@ -86,14 +86,17 @@ impl Likeness {
         if self.fewer == 0 {
             return 1.0;
         }
-        let apart = a.mean.iter().zip(&b.mean);
-        let squares = apart.map(|(a, b)| {
-            let apart = i64::from(i32::from(*a) - i32::from(*b));
+        let square = |a: i16, b: i16| {
+            let apart = i64::from(i32::from(a) - i32::from(b));
             (apart * apart) as u64
-        });
-        let distance = squares.sum::<u64>() + a.odd;
-        if distance >= u64::from(self.far) {
-            return 0.0;
+        };
+        let mut distance = a.odd;
+        for ([a, b], [c, d]) in a.mean.as_chunks().0.iter().zip(b.mean.as_chunks().0) {
+            distance += square(*a, *c) + square(*b, *d);
+            // mostly soon: the axes along which textures scatter most come first
+            if distance >= self.far {
+                return 0.0;
+            }
         }
         let octaves = (distance * u64::from(self.octaves)) >> 32;
         exp2_neg_q30(octaves as u32) as f32 * (1.0 / (1u32 << 30) as f32)
