@@ -5,23 +5,23 @@ use std::error::Error;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use tactus::data::properties::PropertyError;
-use tactus::data::recordings::RecordingError as OfRecordings;
-use tactus::data::replay::MeasureError;
-use tactus::data::table_file::TableFileError;
-use tactus::eval::evaluate::EvaluateError;
-use tactus::eval::experiment::ExperimentError;
-use tactus::eval::first::FirstError;
-use tactus::eval::learn::TableError as LearnError;
-use tactus::eval::verify::VerifyError;
-use tactus::link::line::LineError;
-use tactus::link::log::LogError;
-use tactus::link::{LinkError, PortError};
-use tactus::sim::collection::TrialError;
-use tactus::sim::rig::SimError;
 use tactus_core::explorer::{ExplorerError, ObserveError};
 use tactus_core::features::{MovementError, SlideError as OfSlide};
 use tactus_core::table::TableError as OfTable;
+use tactus_lab::data::properties::PropertyError;
+use tactus_lab::data::recordings::RecordingError as OfRecordings;
+use tactus_lab::data::replay::MeasureError;
+use tactus_lab::data::table_file::TableFileError;
+use tactus_lab::eval::evaluate::EvaluateError;
+use tactus_lab::eval::experiment::ExperimentError;
+use tactus_lab::eval::first::FirstError;
+use tactus_lab::eval::learn::TableError as LearnError;
+use tactus_lab::eval::verify::VerifyError;
+use tactus_lab::sim::collection::TrialError;
+use tactus_lab::sim::rig::SimError;
+use tactus_link::line::LineError;
+use tactus_link::log::LogError;
+use tactus_link::{LinkError, PortError};
 
 create_exception!(
     tactus,

@@ -10,13 +10,13 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tactus::data::recorder::Recorder;
-use tactus::link::line::{Line, found, only_nucleo, open};
-use tactus::link::log::{self, Log};
-use tactus::link::owner::Owner;
-use tactus::link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
 use tactus_core::table::{Name, Table as Read};
 use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
+use tactus_lab::data::recorder::Recorder;
+use tactus_link::line::{Line, found, only_nucleo, open};
+use tactus_link::log::{self, Log};
+use tactus_link::owner::Owner;
+use tactus_link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
 
 use crate::arguments;
 use crate::error::{ProbeError, Raise as _};

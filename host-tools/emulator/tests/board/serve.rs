@@ -5,9 +5,9 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use tactus::link::{LinkError, Port, PortError, ReadTable, Request};
 use tactus_core::table::Table;
 use tactus_core::wire::Status;
+use tactus_link::{LinkError, Port, PortError, ReadTable, Request};
 
 use crate::common::elf;
 

@@ -1,0 +1,31 @@
+//! The host's end of the link to the probe; without the feature `serial` without IO of its own: bytes come in, bytes go out.
+//!
+//! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of them
+//! ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way.
+//! [`Exchange`] runs jobs over bytes that somebody else carries, [`Port`] over anything that reads and writes: a serial line, a TCP
+//! connection.
+
+pub mod bringup;
+pub mod exchange;
+pub mod follow;
+pub mod lifting;
+#[cfg(feature = "serial")]
+pub mod line;
+pub mod log;
+#[cfg(feature = "serial")]
+pub mod owner;
+mod port;
+mod request;
+mod session;
+mod table;
+mod transaction;
+
+pub use exchange::{Exchange, PortError};
+pub use port::Port;
+pub use request::{Found, Request};
+pub use session::{LinkError, MAX_TRIES, Session};
+pub use table::{PushTable, ReadTable};
+pub use transaction::{Job, Transaction};
+
+#[cfg(test)]
+mod tests;
