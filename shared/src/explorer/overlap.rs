@@ -37,7 +37,7 @@ const fn overlap() -> [[f32; 4]; 64] {
             slope - 2.0 * curve * middle,
             curve,
         ];
-        let [constant, linear, square, _] = coefficients;
+        let [constant, linear, square] = coefficients;
         table[n] = [constant as f32, linear as f32, square as f32, 0.0];
         table[64 - n] = [constant as f32, -linear as f32, square as f32, 0.0];
         n += 1;
