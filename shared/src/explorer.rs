@@ -6,14 +6,12 @@ mod candidates;
 mod choice;
 mod config;
 mod confusions;
-#[cfg(any(test, feature = "early"))]
 mod early;
 mod episode;
 mod gaussians;
 mod likelihoods;
 mod likeness;
 mod novelty;
-#[cfg(any(test, feature = "timed"))]
 mod objective;
 mod overlap;
 mod paced;
@@ -27,10 +25,8 @@ pub use answer::{Answer, Verification};
 pub use choice::{ExpectedOutcome, benefit, confusion};
 pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
-#[cfg(any(test, feature = "early"))]
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
-#[cfg(any(test, feature = "timed"))]
 pub use objective::{Objective, SlideTime};
 pub use posterior::{Explorer, Told, Verdict};
 pub use verify::ENOUGH_TRIALS;

@@ -19,8 +19,8 @@ use static_cell::{ConstStaticCell, StaticCell};
 use tactus_core::dsp::Plan;
 use tactus_core::sensor::pressure::{RATE_HZ, SLOTS_HZ};
 
-use super::Cycles;
 use super::workload::{Counter, Workload, run};
+use super::{Cycles, bench, is_wanted};
 use crate::board;
 use crate::chip::KERNELS;
 use crate::chip::current::{CONVERSIONS, Current};
@@ -85,6 +85,9 @@ impl Results {
 
 /// Makes all checks, says how they went, and leaves if a debugger is there. To be called once, from thread mode.
 pub async fn silicon() {
+    if is_wanted() {
+        bench();
+    }
     let r = board::start();
     // a probe attaches
     Timer::after_millis(20).await;

@@ -354,7 +354,7 @@ unsafe fn fold_fours(
             "cmp {odd}, {end}",
             "bne 2b",
             angle = inout(reg) angles.as_ptr() => _,
-            step = in(reg) size_of_val(angles) / half,
+            step = in(reg) size_of_val(angles).checked_div(half).unwrap_or(0),
             a = inout(reg) reals => _,
             b = inout(reg) reals.add(half) => _,
             odd = inout(reg) folded => _,

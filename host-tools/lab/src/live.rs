@@ -4,15 +4,15 @@
 //! the same core is asked what the probe does not say: what is probable while a slide goes on, and where a slide lies among the
 //! textures. Requests and replies are JSON, so that a page needs one function.
 
-mod hearing;
 mod message;
+mod monitor;
 mod scene;
 mod session;
 mod slides;
 mod standing;
 
-pub use hearing::{Heard, Hearing, spectra};
-pub use message::{Expected, Frame, Happening, Known, Measured, Reply, Request, Settings};
+pub use message::{Expected, Frame, Happening, KnownTable, Measured, Reply, Request, Settings};
+pub use monitor::{ProbeMonitor, Received, spectra};
 pub use session::{Session, sentence};
 pub use slides::{TRIALS, Trials, WORLD, WorldError, bring_world, world_table};
 pub use standing::Standing;

@@ -1,7 +1,8 @@
-//! The report of a study: one HTML page that needs nothing else, every figure as .svg, every table as .csv, and study.json.
+//! The report of a study: one HTML page that needs nothing else, every figure as .svg, every table as .csv, and
+//! study.json.
 //!
-//! The words of the page are in its template, `report/page.html`. The files beside it make the tables and figures, and the
-//! numbers that stand between the words.
+//! The words of the page are in its template, `report/page.html`. The files beside it make the tables and figures, and
+//! the numbers that stand between the words.
 
 mod error;
 mod folder;
@@ -62,7 +63,7 @@ pub fn json(study: &Study) -> Result<String, ReportError> {
     Ok(serde_json::to_string(study).map_err(ReportError::Json)? + "\n")
 }
 
-/// Tables, figures and numbers of all that was studied.
+/// Tables, figures and numbers of the whole study.
 fn report(study: &Study) -> Result<Report, DrawError> {
     let mut report = Report::default();
     let about = json!({

@@ -1,5 +1,5 @@
-//! The parts of fingers that can be ordered, as they answer on the bus: written from their data sheets, apart from the core's decoders,
-//! which are what is tested with them. What no data sheet says is chosen and marked.
+//! The parts of fingers that can be ordered, as they answer on the bus: written from their data sheets, independently
+//! of the core's decoders, which are tested with them. Values that no data sheet gives are chosen and marked.
 
 pub mod ads1220;
 mod bus;
@@ -15,7 +15,7 @@ pub use bus::ClockMode;
 use bus::FLOATING;
 pub use fault::PartFault;
 
-/// What answers on the bus.
+/// The parts that answer on the bus.
 #[allow(clippy::large_enum_variant)]
 pub(super) enum Peers {
     BioTac(SensorPeer),
@@ -25,6 +25,8 @@ pub(super) enum Peers {
         cell: ads1220::Ads1220,
         selected: Option<bool>,
         unplugged: bool,
+        /// Only the accelerometer is.
+        without_accelerometer: bool,
     },
 }
 
@@ -39,11 +41,12 @@ impl Peers {
                 cell: ads1220::Ads1220::new(seed),
                 selected: None,
                 unplugged: false,
+                without_accelerometer: false,
             },
         }
     }
 
-    /// What the parts have to complain of.
+    /// Number of complaints of the parts.
     pub(super) fn complaints(&self) -> u64 {
         match self {
             Self::Mems {
@@ -55,21 +58,24 @@ impl Peers {
         }
     }
 
-    /// Everything is plugged in and whole again; what it was told it may have forgotten.
+    /// Plugs in and repairs everything; parts may have lost their settings.
     pub(super) fn mend(&mut self, now_ns: u64) {
         match self {
             Self::BioTac(sensor) => sensor.plug(now_ns),
             Self::Analog(converter) => *converter = mcp3202::Mcp3202::default(),
             Self::Mems {
-                cell, unplugged, ..
+                cell,
+                unplugged,
+                without_accelerometer,
+                ..
             } => {
                 cell.mend_wire();
-                *unplugged = false;
+                (*unplugged, *without_accelerometer) = (false, false);
             }
         }
     }
 
-    /// A tick of the world is over: what goes on without the bus.
+    /// A tick of the world is over: advances the parts that run without the bus.
     pub(super) fn tick(&mut self, now_ns: u64, finger: &Finger) {
         if let (
             Self::Mems {
@@ -106,7 +112,7 @@ impl Peers {
         }
     }
 
-    /// A byte to the selected part, and what it says meanwhile.
+    /// A byte to the selected part; returns the part's byte.
     pub(super) fn byte(&mut self, now_ns: u64, mosi: u8, finger: &mut Finger, fraction: f64) -> u8 {
         match self {
             Self::BioTac(sensor) => {
@@ -121,8 +127,10 @@ impl Peers {
                 cell,
                 selected,
                 unplugged,
+                without_accelerometer,
             } => match *selected {
                 _ if *unplugged => FLOATING,
+                Some(true) if *without_accelerometer => FLOATING,
                 Some(true) => accelerometer.byte(now_ns, mosi),
                 Some(false) => cell.byte(now_ns, mosi),
                 None => FLOATING,
@@ -150,11 +158,18 @@ impl Peers {
         }
     }
 
-    /// Breaks something; what a finger does not have cannot break.
+    /// Breaks a part; a fault of a part that the finger does not have is ignored.
     pub(super) fn break_part(&mut self, now_ns: u64, fault: PartFault, finger: &mut Finger) {
         match (self, fault) {
             (Self::Analog(converter), PartFault::Unplugged) => converter.unplug(),
             (Self::Mems { unplugged, .. }, PartFault::Unplugged) => *unplugged = true,
+            (
+                Self::Mems {
+                    without_accelerometer,
+                    ..
+                },
+                PartFault::AccelerometerUnplugged,
+            ) => *without_accelerometer = true,
             (Self::Mems { accelerometer, .. }, PartFault::AccelerometerBrownOut) => {
                 accelerometer.brown_out(now_ns);
             }

@@ -62,7 +62,7 @@ impl Kernels {
     };
 }
 
-/// What is left of a frame that was folded three times.
+/// A frame that was folded three times.
 pub type Reals = [f32; FRAME / 8];
 
 fn transform_reals(reals: &mut Reals) -> &mut [Complex32; FRAME / 16] {

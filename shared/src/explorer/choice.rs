@@ -8,7 +8,6 @@ use super::gaussians::{
     self, LiveGaussian, LiveTexture, confused, exp_neg, uncertainty_of, uncertainty_of_one,
 };
 use super::likeness;
-#[cfg(any(test, feature = "timed"))]
 use super::objective::{Objective, SlideTime};
 use super::posterior::Explorer;
 use crate::features::Property;
@@ -27,8 +26,6 @@ pub struct ExpectedOutcome {
     /// Its benefit (eq. 12), lower the more often it was made.
     pub benefit: f32,
 }
-
-#[cfg(any(test, feature = "timed"))]
 impl ExpectedOutcome {
     /// Bits by which this action, made `made` times before, is expected to lower an `uncertainty` (eq. 11); never below 0. The
     /// more often it was made the less it is worth, by the exponent of eq. 12.
@@ -92,7 +89,6 @@ impl<const N: usize> Explorer<'_, N> {
         &self,
         outcomes: impl Iterator<Item = &'o ExpectedOutcome>,
     ) -> Option<Action> {
-        #[cfg(any(test, feature = "timed"))]
         if let Objective::BitsPerSecond(time) = self.config.objective {
             return self.choose_by_rate(outcomes, time);
         }
@@ -105,16 +101,12 @@ impl<const N: usize> Explorer<'_, N> {
         });
         best.map(|o| o.action)
     }
-
-    #[cfg(any(test, feature = "timed"))]
     /// Uncertainty (eq. 11) after a slide that tells nothing: every texture is confused with every other one.
     fn uncertainty_now(&self) -> f32 {
         // as eq. 10, which keeps the digits late in an exploration
         let left = |p: &f32| p * (1.0 - p).max(0.0);
         self.posterior.iter().map(left).sum()
     }
-
-    #[cfg(any(test, feature = "timed"))]
     /// Of these `outcomes`, the action that brings the most bits per second; of equals the one of greater benefit, then the
     /// first.
     fn choose_by_rate<'o>(

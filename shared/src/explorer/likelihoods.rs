@@ -8,7 +8,7 @@ use super::student::{ShrinkagePrior, Student};
 use super::whitened;
 use crate::dsp::fixed::ln_q16;
 use crate::features::{Observation, Property};
-use crate::table::{Action, Against, Contents, Gaussian, Gaussians, PACED, mean_step};
+use crate::table::{Action, Against, Contents, Gaussian, Gaussians, mean_step};
 
 /// Most that the likelihood of a slide takes from a logarithm.
 const MOST: i32 = 1 << 26;
@@ -167,7 +167,7 @@ impl<const N: usize> Explorer<'_, N> {
             for (sum, z) in sums.white.iter_mut().zip(&white) {
                 *sum += i32::from(*z);
             }
-            if let Some(pace) = slide.pace.filter(|_| PACED) {
+            if let Some(pace) = slide.pace {
                 sums.pace += i32::from(pace);
                 sums.paces = sums.paces.saturating_add(1);
             }

@@ -1,5 +1,5 @@
-//! The probe in a hand as a [`Rig`]: a person makes its movements, asked on the display. So the core's [`Probe`] serves a
-//! host as a rig with motors does; between two requests the person uses it as if there were no host.
+//! The probe in a hand as a [`Rig`]: a person makes its movements, prompted on the display. So the core's [`Probe`]
+//! serves a host as a rig with motors does; between two requests the person uses it as if there were no host.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
@@ -13,7 +13,6 @@ use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::{Turned, Turning};
 use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Fault, Refused, Rig, RigError};
@@ -24,7 +23,7 @@ use crate::wire::{Command, Event, Failure, Prompt, Request};
 
 /// Ticks from one picture to the next: 20 a second.
 const PICTURE: u32 = TICKS_HZ / 20;
-/// Ticks from one word to the host about what the person is to do to the next: it takes a silent probe for gone.
+/// Ticks between two reminders to the host of the person's task: it takes a silent probe for gone.
 const REMIND: u32 = TICKS_HZ;
 /// The host waits this long for a finger to be lifted, or a weight to be put on, ticks.
 const PATIENCE: u32 = 60 * TICKS_HZ;
@@ -32,22 +31,24 @@ const PATIENCE: u32 = 60 * TICKS_HZ;
 const AIR: u32 = 2 * TICKS_HZ;
 // a look at a weight is a tick
 const _: () = assert!(LOOKS_HZ == TICKS_HZ);
-/// Ticks within which a sensor that works again is noticed.
+/// Longest time until a sensor that works again is noticed, ticks.
 const CLEARED: u32 = TICKS_HZ;
 
-/// What a handheld probe is made of, on the chip or in a test.
+/// Parts of a handheld probe, on the chip or in a test.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Hand {
-    /// Whether its finger feels gravity.
-    const FEELS_GRAVITY: bool = false;
+    /// True if its finger feels gravity.
+    fn feels_gravity(&self) -> bool {
+        false
+    }
 
     /// Waits for the next hundredth of a second.
     async fn wait(&mut self);
 
-    /// The oldest word of the sensor that nobody has taken.
+    /// Takes the oldest word of the sensor.
     fn word(&mut self) -> Option<Option<Pressure>>;
 
-    /// How far it has moved since this was asked last, by its sensor of motion, if there is one: see [`Handheld::moved`].
+    /// Motion since the last call, by its sensor of motion, if there is one: see [`Handheld::moved`].
     fn moved(&mut self) -> Option<Moved> {
         None
     }
@@ -57,10 +58,10 @@ pub trait Hand {
         None
     }
 
-    /// Whether the button is pressed.
+    /// Returns true if the button is pressed.
     fn is_pressed(&mut self) -> bool;
 
-    /// Has the sensor's words come, or not. Time may have passed without ticks before they come again.
+    /// Turns the sensor's words on or off. Time may have passed without ticks before they come again.
     fn listen(&mut self, on: bool);
 
     /// Sounds a tone, Hz, or none.
@@ -69,16 +70,16 @@ pub trait Hand {
     /// Shows a screen.
     fn show(&mut self, screen: &Screen<'_>);
 
-    /// What the page about the probe says, but for the calibration.
+    /// Facts of the page about the probe, without the calibration.
     fn about(&self) -> About;
 
-    /// So the probe is now: answered at any time.
+    /// Publishes the state of the probe, which is answered at any time.
     fn publish(&mut self, state: &RigState);
 
-    /// Whether the host stopped what it asked for.
+    /// Returns true if the host has stopped its request.
     fn is_stopped(&self) -> bool;
 
-    /// Whether the host wants raw samples.
+    /// Returns true if the host wants raw samples.
     fn streams(&self) -> bool;
 
     /// Sends an event to the host.
@@ -89,7 +90,7 @@ pub trait Hand {
 pub struct ByHand<'p, H> {
     /// Its parts.
     pub hand: H,
-    /// What the person sees.
+    /// State of the person's use: pages, touch and job.
     pub handheld: Handheld<'p>,
     calibration: RigCalibration,
     skin: SkinCare,
@@ -97,13 +98,13 @@ pub struct ByHand<'p, H> {
     listens: bool,
     tone: Option<u16>,
     ticks: u32,
-    /// What the host was told last of what the person is to do, and when.
+    /// Last prompt that was sent to the host, and its time.
     prompt: (Option<Prompt>, u32),
     /// The slide that the host wants next.
     asked: Asked,
     /// Share of the memory for textures that is taken.
     memory: f32,
-    /// What is done is done for the host.
+    /// True while it serves a request of the host.
     serves: bool,
 }
 
@@ -124,10 +125,7 @@ impl<'p, H: Hand> ByHand<'p, H> {
             memory: 0.0,
             serves: false,
         };
-        #[cfg(any(feature = "turns", test))]
-        {
-            by_hand.handheld.turns = H::FEELS_GRAVITY;
-        }
+        by_hand.handheld.turns = by_hand.hand.feels_gravity();
         by_hand.use_calibration(calibration);
         by_hand
     }
@@ -143,7 +141,7 @@ impl<'p, H: Hand> ByHand<'p, H> {
         self.handheld.calibrate(scale);
     }
 
-    /// A hundredth of a second: words, button, buzzer, display, and what the host hears.
+    /// A hundredth of a second: words, button, buzzer, display, and the events for the host.
     pub async fn tick(&mut self) {
         self.hand.wait().await;
         self.ticks = self.ticks.wrapping_add(1);
@@ -180,7 +178,7 @@ impl<'p, H: Hand> ByHand<'p, H> {
         self.remind();
     }
 
-    /// Has the sensor's words come while they are wanted.
+    /// Turns the sensor's words on while they are wanted.
     fn heed(&mut self) {
         if self.handheld.listens() != self.listens {
             self.listens = self.handheld.listens();
@@ -188,18 +186,18 @@ impl<'p, H: Hand> ByHand<'p, H> {
         }
     }
 
-    /// The words do not come any more until the next tick that wants them: nobody takes them meanwhile.
+    /// Turns the words off until the next tick that wants them: no code takes them meanwhile.
     fn pause(&mut self) {
         self.hand.listen(false);
         self.listens = false;
         while let Some(word) = self.hand.word() {
             self.handheld.word(word);
         }
-        // what comes next does not follow what came
+        // the next words do not follow the last ones
         self.handheld.lose(1);
     }
 
-    /// Tells the host what the person is to do.
+    /// Sends the person's task to the host.
     fn remind(&mut self) {
         let prompt = self.handheld.prompt();
         let (told, at) = self.prompt;
@@ -221,7 +219,7 @@ impl<'p, H: Hand> ByHand<'p, H> {
         self.hand.show(&screen);
     }
 
-    /// A tick of something that a person is asked for, and whether it can go on.
+    /// Waits a tick for the person; returns true if the waiting may continue.
     async fn go_on(&mut self) -> Result<Option<Answer>, RigError> {
         self.tick().await;
         if self.serves && self.hand.is_stopped() {
@@ -269,7 +267,7 @@ impl<H: Hand> Rig for ByHand<'_, H> {
             }
             self.go_on().await?;
         }
-        // what comes next may take long, and nobody takes words meanwhile
+        // the next step may take long, and no code takes words meanwhile
         self.pause();
         Ok(())
     }
@@ -277,7 +275,7 @@ impl<H: Hand> Rig for ByHand<'_, H> {
 
 impl<H: Hand> RigHandle for ByHand<'_, H> {
     fn state(&self) -> RigState {
-        // without words nobody knows what the finger does
+        // without words the finger's state is unknown
         let heard = self.handheld.listens();
         RigState {
             phase: self.handheld.phase(),
@@ -374,9 +372,8 @@ impl<H: Hand> RigHandle for ByHand<'_, H> {
     }
 
     // in images that never do it, a future of it would take flash
-    #[cfg(any(feature = "turns", test))]
     async fn turn_over(&mut self) -> Result<Turned, Failure> {
-        if !H::FEELS_GRAVITY {
+        if !self.hand.feels_gravity() {
             return Err(Failure::OtherProbe);
         }
         self.handheld.ask_to_turn(false);
@@ -399,17 +396,17 @@ impl<H: Hand> RigHandle for ByHand<'_, H> {
     }
 }
 
-/// Who hears what the probe does, and what of it the display shows in the end.
+/// A sink that passes the probe's events on and keeps the verdict for the display.
 #[derive(Debug)]
 pub struct Shown<E> {
     to: E,
     judgement: Judgement,
-    /// There was a verdict.
+    /// True if there was a verdict.
     told: bool,
 }
 
 impl<E: Events> Shown<E> {
-    /// Hands everything on to `to`.
+    /// Passes everything on to `to`.
     pub fn new(to: E) -> Self {
         Self {
             to,
@@ -418,7 +415,7 @@ impl<E: Events> Shown<E> {
         }
     }
 
-    /// The verdict that was told, once.
+    /// Takes the verdict; `None` the second time.
     fn judgement(&mut self) -> Option<Judgement> {
         core::mem::take(&mut self.told).then(|| core::mem::take(&mut self.judgement))
     }
@@ -458,7 +455,7 @@ impl<E: Events> Events for Shown<E> {
 /// The probe in the hand of a person.
 pub type HandProbe<'m, H, F, B, E> = Probe<'m, ByHand<'m, H>, F, B, Shown<E>>;
 
-/// A hundredth of a second of the person's own use, and what it has to be done with the table; `log` hears that.
+/// A hundredth of a second of the person's own use, with the job on the table, if there is one; `log` gets the outcome.
 pub async fn step<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, log: impl FnMut(Outcome<'_>))
 where
     H: Hand,
@@ -496,7 +493,6 @@ where
         rig.hand.wait().await;
         match job {
             Job::Calibrate => rig.set_force(memory).await,
-            #[cfg(any(feature = "turns", test))]
             Job::TurnOver => rig.set_gravity(memory).await,
             job => work(job, &mut rig.handheld, memory, events, log).await,
         }
@@ -504,7 +500,7 @@ where
     }
 }
 
-/// What of a request the display names.
+/// The slides and the texture of a request that the display names.
 fn asked(command: &Command) -> (Asked, Option<Name>) {
     match command {
         Command::Identify(wanted) | Command::Verify(wanted) => (
@@ -519,7 +515,7 @@ fn asked(command: &Command) -> (Asked, Option<Name>) {
     }
 }
 
-/// Serves a request of the host, and shows what came of it.
+/// Serves a request of the host, and shows its result.
 pub async fn serve<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, request: &Request)
 where
     H: Hand,

@@ -1,4 +1,4 @@
-//! What the handheld wants to be done with the table, for the task that owns it.
+//! Jobs of the handheld on the table, for the task that owns it.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
@@ -10,12 +10,12 @@ use crate::store::StoreError;
 use crate::table::Name;
 use crate::wire::MemoryError;
 
-/// What came of a job, for the log.
+/// The outcome of a job, for the log.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Outcome<'j> {
     /// So many slides were judged.
     Judged {
-        /// How many.
+        /// Their number.
         slides: usize,
         /// Name of the leading texture, and its probability.
         leading: (&'j str, f32),
@@ -28,7 +28,7 @@ pub enum Outcome<'j> {
     NotLearned(&'static str),
 }
 
-/// Does a job, and tells the handheld what came of it; `log` hears it first.
+/// Does a job, and gives the handheld its outcome; `log` gets it first.
 pub async fn work<F: NorFlash, B: StoredBytes<F>>(
     job: Job,
     handheld: &mut Handheld<'_>,
@@ -70,9 +70,8 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>>(
             let textures = memory.table().map_or(0, |table| table.textures());
             handheld.learned(learned, textures);
         }
-        // whoever has the finger does it
+        // the task with the finger does it
         Job::Calibrate => {}
-        #[cfg(any(feature = "turns", test))]
         Job::TurnOver => {}
     }
 }
@@ -99,7 +98,7 @@ async fn teach<F: NorFlash, B: StoredBytes<F>>(
     Ok(name)
 }
 
-/// What the display says of it, in its four lines of 21 letters; the host is told what it is made of.
+/// The error in the display's four lines of 21 letters; the host gets its parts.
 pub fn words(why: &MemoryError) -> &'static str {
     match why {
         MemoryError::NoEpisode => "There is no slide to learn from. Slide first.",

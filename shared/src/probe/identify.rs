@@ -7,7 +7,7 @@ use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
 use crate::explorer::{self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError};
 use crate::rig::{Rig, RigError};
-use crate::table::{Contents, MAX_TEXTURES, Name, PACED, Table};
+use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
@@ -38,12 +38,9 @@ where
         }
     }
     let mut explorer = Explorer::<'_, MAX_TEXTURES>::empty(table);
+    let candidates = candidates(&wanted.among, table.textures());
     explorer
-        .consider(
-            rig.measures(),
-            config,
-            candidates(&wanted.among, table.textures()),
-        )
+        .consider(rig.measures(), config, candidates)
         .map_err(Failure::Explorer)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
@@ -65,7 +62,7 @@ where
             }
             ExplorationStep::Early(ms) => tell(Event::Early(ms)),
             ExplorationStep::Measured(action, measurement, posterior) => {
-                if PACED && let Some(pace) = measurement.pace {
+                if let Some(pace) = measurement.pace {
                     tell(Event::Pace(pace));
                 }
                 tell(Event::SlideReport {
@@ -108,7 +105,7 @@ where
 }
 
 /// The textures that it may be; none stands for all.
-fn candidates(among: &[u16], textures: u16) -> impl Iterator<Item = u16> {
+pub(crate) fn candidates(among: &[u16], textures: u16) -> impl Iterator<Item = u16> {
     let all = if among.is_empty() { 0..textures } else { 0..0 };
     among.iter().copied().chain(all)
 }

@@ -121,7 +121,7 @@ fn of_a_pair_only_one_can_be_the_answer() {
 fn what_goes_wrong_is_said() {
     assert_eq!(
         identified(&[], &wanted(&[])).0.unwrap_err(),
-        "the rig does not come to an end: home it"
+        "the movement does not end: home the rig"
     );
     let error = identified(&[], &wanted(&[7])).0.unwrap_err();
     assert!(error.contains("not textures of the table"), "{error}");

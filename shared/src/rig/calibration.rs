@@ -7,7 +7,7 @@ use super::turning;
 use crate::CRC32;
 use crate::sensor::pressure::{Calibration, CalibrationError};
 
-/// What was measured of one rig, on which day, and with which sensor.
+/// Measured constants of one rig, with their dates and the sensor they belong to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RigCalibration {
     /// Fingertip: zero and counts per newton.
@@ -16,14 +16,16 @@ pub struct RigCalibration {
     pub unloaded_a: (f32, f32),
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
-    /// Day on which the force per count was measured, as 20261121, [`RigCalibration::UNDATED`] where nobody knew the day, 0 if
-    /// it was not. Programs before version 7 of the messages dated every calibration: see [`RigCalibration::scale_day`].
+    /// Day on which the force per count was measured, as 20261121; [`RigCalibration::UNDATED`] if the day is unknown,
+    /// 0 if it was not measured. Programs before version 7 of the messages dated every calibration: see
+    /// [`RigCalibration::scale_day`].
     pub date: u32,
-    /// Whether P_DC in the air is this finger's, and no default.
+    /// True if P_DC in the air was measured with this finger and is no default.
     pub air_known: bool,
-    /// Day on which the accelerometer was turned over, and `pressure.pac_pa_per_count` with it measured, in mg; as `date`.
+    /// Day on which the accelerometer was turned over and `pressure.pac_pa_per_count` was measured with it, in mg;
+    /// format as `date`.
     pub turned: u32,
-    /// Serial number of the sensor, as the sensor says it.
+    /// Serial number of the sensor, as the sensor sends it.
     pub serial: [u8; 16],
 }
 
@@ -31,18 +33,18 @@ impl RigCalibration {
     /// The date of a calibration that a probe made without a computer: it has no clock.
     pub const UNDATED: u32 = 1;
 
-    /// Marks the stored date where it does not say whether P_DC in the air is known: of a date that programs before version 7
-    /// wrote, it is; of 0, it is not.
+    /// Marks a stored date whose rule about P_DC in the air is inverted: the plain rule, from programs before version
+    /// 7, is that it is known if there is a date.
     const OTHER_AIR: u32 = 1 << 31;
 
-    /// Day on which the force per count was measured, see [`RigCalibration::date`]. The paper's own value was not, whatever the
-    /// date says.
+    /// Day on which the force per count was measured, see [`RigCalibration::date`]. `None` for the paper's own value,
+    /// whatever the date is.
     pub fn scale_day(&self) -> Option<u32> {
         let is_papers = self.pressure.force_mn_per_count == Calibration::PAPER.force_mn_per_count;
         (self.date != 0 && !is_papers).then_some(self.date)
     }
 
-    /// This, with P_DC in the air as it was measured, counts.
+    /// The calibration with a measured P_DC in the air, counts.
     #[must_use]
     pub fn with_air(mut self, counts: f32) -> Self {
         self.pressure.pdc_no_contact = counts;
@@ -59,9 +61,9 @@ impl RigCalibration {
     /// Most bytes of a stored record.
     pub const BYTES: usize = 64;
 
-    /// The record as it is stored: nine f32, the date, the serial number, the day on which the accelerometer was turned over, if
-    /// it was, and a CRC-32 of these; little-endian. The highest bit of the date says whether P_DC in the air is known: set, if it is
-    /// without a date, or is not with one.
+    /// The record as it is stored: nine f32, the date, the serial number, the day on which the accelerometer was turned
+    /// over, if it was, and a CRC-32 of these; little-endian. The highest bit of the date inverts the rule that P_DC in
+    /// the air is known if there is a date.
     #[inline(never)]
     pub fn to_bytes(&self) -> Vec<u8, { Self::BYTES }> {
         let numbers = self.numbers().into_iter().flat_map(f32::to_le_bytes);
@@ -83,7 +85,7 @@ impl RigCalibration {
     /// The record in `bytes`, checked.
     ///
     /// # Errors
-    /// [`RigCalibrationError::Damaged`], or what [`RigCalibration::check`] says.
+    /// [`RigCalibrationError::Damaged`], or the error of [`RigCalibration::check`].
     #[inline]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RigCalibrationError> {
         let (body, crc) = bytes
@@ -147,7 +149,7 @@ impl RigCalibration {
         ]
     }
 
-    /// Checks a record before a motor is moved by it.
+    /// Checks a record before it moves a motor.
     ///
     /// # Errors
     /// See [`RigCalibrationError`].
@@ -160,9 +162,7 @@ impl RigCalibration {
             return Err(RigCalibrationError::Pressure(CalibrationError::Scale));
         }
         let mg = &self.pressure.pac_pa_per_count;
-        // in images of other fingers it is not used
-        let turns = cfg!(any(feature = "turns", test));
-        if turns && self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
+        if self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
             return Err(RigCalibrationError::Turned);
         }
         let (standstill, per_mm_s) = self.unloaded_a;
@@ -174,7 +174,7 @@ impl RigCalibration {
     }
 }
 
-/// Why a calibration is not used.
+/// Reasons for refusing a calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum RigCalibrationError {
     /// The fingertip's constants.
@@ -192,7 +192,7 @@ pub enum RigCalibrationError {
     /// The points do not lie on a line: R^2 below 0.99.
     #[error("the points do not lie on a line (R^2 below 0.99): measure again")]
     NoLine,
-    /// What a count of an accelerometer is worth. New in version 10.
+    /// The value of an accelerometer's count. New in version 10.
     #[error("an accelerometer's count is within a tenth of 0.976 mg: turn the finger over again")]
     Turned,
 }

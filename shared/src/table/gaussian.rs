@@ -25,7 +25,7 @@ pub struct Gaussian {
     pub sd: f32,
 }
 
-/// What one action is expected to feel like, texture by texture.
+/// The expected distributions of one action, texture by texture.
 #[derive(Clone, Copy, Debug)]
 pub struct Gaussians<'t> {
     /// Each begins `stride` bytes after the one before.
@@ -60,8 +60,8 @@ impl<'t> Gaussians<'t> {
         })
     }
 
-    /// The factor that makes steps of the means by steps of the standard deviation numbers whose square is half of that of
-    /// standard deviations, in Q16.
+    /// The factor from (steps of the means / steps of the standard deviation) to numbers whose square is half of that
+    /// of standard deviations, in Q16.
     pub fn scale(&self) -> f32 {
         /// Square root of 2^16 / 2.
         const HALF_Q16: f32 = 181.019_34;

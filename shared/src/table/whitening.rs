@@ -1,17 +1,17 @@
 //! The space in which the slides of a texture scatter by 1 in every direction: from features to whitened features.
 //!
-//! The paper looks at one property per slide. Taking all features of a slide together needs their covariance; five trials of
-//! one texture do not give it, but those of all textures together do: [`super::whiten`].
+//! The paper looks at one property per slide. Taking all features of a slide together needs their covariance; five
+//! trials of one texture do not give it, but those of all textures together do: [`super::whiten`].
 
 use heapless::Vec;
 
 use crate::features::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
 
-/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within
-/// a texture, and the means of different textures are uncorrelated in z, those that scatter most first.
+/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides
+/// within a texture, and the means of different textures are uncorrelated in z, those that scatter most first.
 ///
-/// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers, so
-/// their rounding adds no error.
+/// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers,
+/// so their rounding adds no error.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Whitening {
     pub(super) features: usize,
@@ -68,7 +68,7 @@ impl Whitening {
         self.features
     }
 
-    /// What a change of the features by so many steps is in whitened ones, to the nearest 1/256.
+    /// The whitened change that a change of the features by so many steps makes, to the nearest 1/256.
     pub fn change(&self, steps: &[f64; MAX_FEATURES]) -> Slope {
         let view = View {
             features: self.features,
@@ -182,7 +182,7 @@ pub fn white(steps: i16) -> f32 {
     f32::from(steps) / WHITE_STEPS
 }
 
-/// What all textures are like at a movement, whitened.
+/// The whitened means of all textures at a movement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Column<'t> {
     /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one
@@ -201,7 +201,7 @@ impl<'t> Column<'t> {
         self.means.get(texture * self.stride..).unwrap_or_default()
     }
 
-    /// How many slides a texture was learned from.
+    /// The number of slides that a texture was learned from.
     #[inline]
     pub(crate) fn slides(&self, texture: usize) -> u8 {
         self.slides

@@ -1,4 +1,4 @@
-//! The simulated rig behind the board's pins, and what it notes of them.
+//! The simulated rig behind the board's pins, and its notes of them.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,11 +12,10 @@ use super::line::LineNoise;
 use super::motion::MotionPeer;
 use super::options::Options;
 use super::record::{Recorder, Slide, Touch};
-use super::scope::{BridgePwm, Frame, Scope};
 use super::wave::Wave;
 
-/// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at 2.7 V
-/// (DS21034), 150 ns a clock of the ADS1220 (SBAS501, 6.6).
+/// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at
+/// 2.7 V (DS21034), 150 ns a clock of the ADS1220 (SBAS501, 6.6).
 const fn fastest_byte_ns(finger: FingerName) -> &'static [u64] {
     match finger {
         FingerName::Biotac => &[800],
@@ -24,13 +23,11 @@ const fn fastest_byte_ns(finger: FingerName) -> &'static [u64] {
         FingerName::Mems => &[800, 1200],
     }
 }
-/// What reads Z from the accelerometer, in each slot.
+/// The byte that reads Z from the accelerometer, in each slot.
 const READ_Z: u8 = 0xAC;
 /// CR1 of an SPI (RM0090 28.5.1): clock phase, clock polarity.
 const CR1_MODE: u64 = 0b11;
 const CR1_LSB_FIRST: u64 = 1 << 7;
-/// Where its baud rate begins: the clock is divided by 2^(BR + 1).
-const CR1_BR: u64 = 3;
 
 /// The rig, which the emulator's thread and its owner look at in turn.
 pub(crate) type SharedRig = Arc<Mutex<Rig>>;
@@ -53,7 +50,7 @@ pub enum Output {
     StageDuty(f64),
     /// Level of the stage's EN.
     StageEnable(bool),
-    /// What the handheld's buzzer sounds, Hz.
+    /// Tone of the handheld's buzzer, Hz.
     Buzzer(Option<u32>),
 }
 
@@ -90,7 +87,6 @@ pub struct Rig {
     encoder_lines: (bool, bool),
     trace_ns: u64,
     trace: VecDeque<(u64, Output)>,
-    scope: Option<Scope>,
     recorder: Recorder,
     commands: u64,
     display: Display,
@@ -145,7 +141,6 @@ impl Rig {
             encoder_lines: (false, false),
             trace_ns: options.trace_s * 1_000_000_000,
             trace: VecDeque::new(),
-            scope: None,
             recorder: Recorder::default(),
             commands: 0,
             display: Display::default(),
@@ -167,21 +162,6 @@ impl Rig {
         self.trace.iter()
     }
 
-    /// Puts an oscilloscope's probes to the pins, and gives what they saw since that was done last.
-    pub fn probe_pins(&mut self) -> Scope {
-        self.scope.replace(Scope::default()).unwrap_or_default()
-    }
-
-    /// The stage's PWM now; `None` while its timer stands.
-    pub fn bridge_pwm(&self) -> Option<BridgePwm> {
-        let now = self.wave?.phase(self.world.now_ns())?;
-        Some(BridgePwm {
-            period_s: now.period_s,
-            duty: self.duty_timer,
-            since_s: now.since_s,
-        })
-    }
-
     /// The handheld's display.
     pub fn display(&self) -> &Display {
         &self.display
@@ -191,7 +171,7 @@ impl Rig {
         &mut self.display
     }
 
-    /// What the buzzer sounds now, Hz.
+    /// Sets the buzzer's tone, Hz.
     pub(crate) fn buzzer(&mut self, now_ns: u64, tone: Option<u32>) {
         if tone != self.tone {
             self.tone = tone;
@@ -199,7 +179,7 @@ impl Rig {
         }
     }
 
-    /// How every slide so far was really made.
+    /// The ground truth of every slide so far.
     pub fn slides(&self) -> &[Slide] {
         self.recorder.slides()
     }
@@ -214,7 +194,8 @@ impl Rig {
         self.commands
     }
 
-    /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed counts.
+    /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed
+    /// counts.
     pub fn expect_speed(&mut self, mm_s: f64) {
         self.recorder.expect_speed(mm_s);
     }
@@ -223,7 +204,7 @@ impl Rig {
         self.world.advance_to(now_ns);
     }
 
-    /// Lets time pass and takes note of what is so.
+    /// Lets time pass and records the truth.
     pub(crate) fn tick(&mut self, now_ns: u64) {
         self.world.advance_to(now_ns);
         self.recorder.tick(now_ns, &self.world.truth());
@@ -277,12 +258,12 @@ impl Rig {
         self.update_duty(now_ns);
     }
 
-    /// Where the timer's PWM is in its period, if it makes one.
+    /// Sets the timer's PWM and its place in its period, if it makes one.
     pub(super) fn stage_wave(&mut self, wave: Option<Wave>) {
         self.wave = wave;
     }
 
-    /// What the converter reads of the motor's current.
+    /// Reading of the converter for the motor's current.
     pub(super) fn motor_adc(&mut self, now_ns: u64) -> u16 {
         self.advance_to(now_ns);
         // a port's level does not swing
@@ -291,17 +272,7 @@ impl Rig {
             Some(phase) => self.world.motor_adc_within(phase),
             None => self.world.motor_adc(),
         };
-        if let Some(scope) = &mut self.scope {
-            scope.current.push((now_ns, counts));
-        }
         counts
-    }
-
-    /// The level of the emergency stop's pin.
-    pub(super) fn stop_line(&mut self, now_ns: u64, high: bool) {
-        if let Some(scope) = &mut self.scope {
-            scope.stop.push((now_ns, high));
-        }
     }
 
     /// PWM as an output of its port; `None` leaves it to the timer.
@@ -335,7 +306,7 @@ impl Rig {
         }
     }
 
-    /// Chip select of a part falls, or rises. Whether a sample command ends with it.
+    /// Chip select of a part falls, or rises. Returns true if a sample command ends with it.
     pub(crate) fn select_part(&mut self, now_ns: u64, part: u8, selected: bool) -> bool {
         let is_there = usize::from(part) < fastest_byte_ns(self.finger).len();
         if !is_there || selected == (self.selected == Some(part)) {
@@ -343,9 +314,6 @@ impl Rig {
         }
         self.selected = selected.then_some(part);
         let commanded = std::mem::take(&mut self.commanded);
-        if let Some(scope) = &mut self.scope {
-            scope.select.push((now_ns, !selected));
-        }
         if selected {
             self.selected_ns = now_ns;
             self.bytes = 0;
@@ -357,13 +325,14 @@ impl Rig {
         commanded
     }
 
-    /// Whether the pins carry SPI1, and TIM4.
+    /// Connects the pins to SPI1, and to TIM4, or not.
     pub(crate) fn wire(&mut self, sensor: bool, encoder: bool) {
         self.sensor_wired = sensor;
         self.encoder_wired = encoder;
     }
 
-    /// What drives MISO, MOSI, and lines A and B of the encoder, as far as the chip only reads these pins.
+    /// Levels at MISO, MOSI, and lines A and B of the encoder, as far as the chip only reads these pins; `None` if
+    /// nothing drives them.
     pub(super) fn read_pins(&mut self) -> [Option<bool>; 4] {
         let [miso, mosi] = match self.selected {
             Some(_) => self.world.data_lines(),
@@ -376,20 +345,6 @@ impl Rig {
     /// CR1 of SPI1.
     pub(crate) fn spi_control(&mut self, cr1: u64) {
         self.spi_control = cr1;
-    }
-
-    /// A frame over the sensor's bus was over.
-    pub(super) fn spi_frame(&mut self, at_ns: u64, bits: u8, mosi: u32, miso: u32) {
-        let divider = 2 << (self.spi_control >> CR1_BR & 0b111);
-        if let Some(scope) = &mut self.scope {
-            scope.frames.push(Frame {
-                at_ns,
-                bits,
-                mosi,
-                miso,
-                divider,
-            });
-        }
     }
 
     /// A byte over the sensor's bus, at its end.
@@ -471,9 +426,6 @@ impl Rig {
     pub(crate) fn next_encoder_lines(&mut self) -> Option<(bool, bool)> {
         let edge = self.world.next_encoder_edge()?;
         self.encoder_lines = (edge.a, edge.b);
-        if let Some(scope) = &mut self.scope {
-            scope.encoder.push(edge);
-        }
         Some(self.encoder_lines())
     }
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use tactus_core::explorer::Method;
 use tactus_core::wire::{Event, Identify, Phase};
 use tactus_emulator::host::exploration::{Exploration, explore};
-use tactus_emulator::host::timeline::{Part, Timeline};
-use tactus_emulator::host::under_finger::{self, Known};
+use tactus_emulator::host::milestones::Milestones;
+use tactus_emulator::host::under_finger::{self, FirmwareData};
 use tactus_lab::eval::learn::know_lengths;
 use tactus_lab::sim::collection::Collection;
 use tactus_world::faults::Fault;
@@ -15,14 +15,14 @@ use tactus_world::faults::Fault;
 use crate::common::{boot, elf};
 
 /// A world of so many textures that holds this one, and what is learned of it with and without lengths.
-fn world(seed: u64, texture: u8, among: u8) -> (Collection, [Known; 2]) {
+fn world(seed: u64, texture: u8, among: u8) -> (Collection, [FirmwareData; 2]) {
     let collection = Collection {
         seed,
         textures: Collection::spread(texture, among),
         trials: 5,
     };
     let early = under_finger::simulated_early(&collection, Method::Fused, || ()).unwrap();
-    let whole = Known {
+    let whole = FirmwareData {
         table: know_lengths(&early.table, &[]).unwrap(),
         ..early.clone()
     };
@@ -41,15 +41,15 @@ struct Seen {
     seconds_to_verdict: f64,
 }
 
-fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
+fn seen(elf: &Path, world: &Collection, known: &FirmwareData, texture: u8) -> Seen {
     let unknown = under_finger::mounted(world, texture, 7);
     let mut talk = boot(elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
         .unwrap();
     talk.board().rig().world().reset_extremes();
     let (mut early, mut path, mut sliding, mut most_n) = (Vec::new(), (0.0, 0.0), false, 0.0_f64);
-    let mut timeline = Timeline::new();
-    timeline.begin(talk.now_ns(), Part::Stage);
+    let mut times = Milestones::default();
+    times.begin(talk.now_ns());
     let asked = Identify {
         seed: 11,
         ..Identify::default()
@@ -66,7 +66,7 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
                 path.1 = truth.stage_mm;
             }
             let Some(report) = report else { return };
-            timeline.hear(now_ns, &report.event, &truth);
+            times.hear(now_ns, &report.event);
             match report.event {
                 Event::Early(ms) => early.push(ms),
                 Event::Phase(phase) => {
@@ -84,7 +84,7 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
         early,
         way_mm: path.1 - path.0,
         most_n,
-        seconds_to_verdict: timeline.seconds_to_verdict().unwrap(),
+        seconds_to_verdict: times.seconds_to_verdict().unwrap(),
     }
 }
 
@@ -194,7 +194,7 @@ fn the_guard_trips_while_a_slide_is_ended() {
 }
 
 /// How much sooner a person knows, over 20 worlds: `cargo test --release --test board early:: -- --ignored --nocapture` in this folder, with
-/// the ELF of `cargo xtask build` in `TACTUS_ELF`.
+/// the ELF of `cargo xtask size` in `TACTUS_ELF`.
 #[test]
 #[ignore = "20 worlds take a quarter of an hour"]
 fn verdicts_come_sooner() {

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
-use tactus_emulator::board::cycles::Spent;
+use tactus_emulator::board::cycles::CycleCount;
 use tactus_emulator::board::{Emulator, Options};
 use tactus_world::world::Setup;
 
 use crate::common::elf_of;
 
-/// How far a kernel's cycles by the image may be off the model's: a compiler's next version changes them.
-const OFF: f64 = 0.05;
+/// How far a kernel's cycles by the image may be off the model's: compilers differ. The image itself allows 30 %.
+const OFF: f64 = 0.2;
 
 /// Runs the image to its end; `each` sees its lines.
 fn run(board: &mut Emulator, mut each: impl FnMut(&mut Emulator, &str)) -> Vec<String> {
@@ -60,7 +60,7 @@ fn an_intact_chip_passes_and_its_kernels_take_what_the_image_says() {
         };
         let (name, rest) = said.rsplit_once(", ").unwrap();
         let modelled: f64 = rest.split(' ').next().unwrap().parse().unwrap();
-        let spent: Spent = board.cycle_profile().unwrap().total(0..1);
+        let spent: CycleCount = board.cycle_profile().unwrap().total(0..1);
         kernels.push((name.to_owned(), modelled, spent));
     });
     assert_eq!(failed(&log), [""; 0]);

@@ -27,11 +27,11 @@ pub struct MeasuredSlide {
     pub number: u32,
     /// The movement that made it.
     pub movement: Movement,
-    /// What the core computed.
+    /// The core's measurement.
     pub measurement: Measurement,
 }
 
-/// Why a folder cannot be measured.
+/// Reasons why a folder cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// It cannot be read.
@@ -44,13 +44,13 @@ pub enum MeasureError {
         texture: String,
         /// Number of the slide.
         number: u32,
-        /// What is wrong with it.
+        /// Its fault.
         why: SlideError,
     },
 }
 
-/// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns the
-/// slides of each texture in the order of time.
+/// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns
+/// the slides of each texture in the order of time.
 ///
 /// # Errors
 /// The first file that cannot be read, or the first slide that has no properties.
@@ -67,14 +67,14 @@ pub fn measure_all(
     })
 }
 
-/// A recorded slide, and what its first part alone would have said.
+/// A recorded slide, and the features of its first part alone.
 #[derive(Clone, Debug)]
 pub struct CutSlide {
     /// The whole slide.
     pub whole: MeasuredSlide,
-    /// How long it is at constant speed, s.
+    /// Its length at constant speed, s.
     pub seconds: f32,
-    /// Its first part, for each length that was asked for; `None` where it does not last longer.
+    /// Its first part, for each requested length; `None` if it does not last longer.
     pub first: Vec<Option<Measurement>>,
 }
 

@@ -1,8 +1,8 @@
-//! What it brings to end a slide as soon as the verdict is certain, and what it costs.
+//! Benefit and cost of ending a slide as soon as the verdict is certain.
 //!
-//! Each exploration is played once, with slides to their end, and before each slide is observed the explorer looks at its first
-//! parts, by a table that was learned from the first parts of the training slides. So both ways see the same slides, up to the one
-//! that would have ended early, and that is the last.
+//! Each exploration is played once, with slides to their end, and before each slide is observed the explorer looks at
+//! its first parts, by a table that was learned from the first parts of the training slides. So both ways see the same
+//! slides, up to the one that would have ended early, and that is the last.
 
 use serde::Serialize;
 use tactus_core::explorer::{Config, Explorer, Look, Told};
@@ -14,7 +14,8 @@ use super::experiment::{Experiment, Run};
 use super::learn::{TableError, know_lengths};
 use crate::data::replay::{CutSlide, MeasuredSlide};
 
-/// The slides as their first parts of the `n`th length. What stands for one that is not longer says nothing: see [`is_longer`].
+/// The slides as their first parts of the `n`th length. A slide that is not longer is replaced by an empty one: see
+/// [`is_longer`].
 pub fn of_length(slides: &[Vec<CutSlide>], n: usize) -> Vec<Vec<MeasuredSlide>> {
     let cut = |slide: &CutSlide| {
         let mut cut = slide.whole.clone();
@@ -27,7 +28,7 @@ pub fn of_length(slides: &[Vec<CutSlide>], n: usize) -> Vec<Vec<MeasuredSlide>> 
     rows.map(|row| row.iter().map(cut).collect()).collect()
 }
 
-/// Whether all slides of a movement last longer than the `n`th length.
+/// Returns true if all slides of a movement last longer than the `n`th length.
 pub fn is_longer(slides: &[Vec<CutSlide>], movement: Movement, n: usize) -> bool {
     let mut all = slides.iter().flatten();
     all.all(|slide| slide.whole.movement != movement || slide.first[n].is_some())
@@ -49,7 +50,8 @@ struct Shorter {
 }
 
 impl Lengths {
-    /// From slides and their first parts, of these lengths in ms, the shortest first; `make` makes an experiment of one of them.
+    /// From slides and their first parts, of these lengths in ms, the shortest first; `make` makes an experiment of one
+    /// of them.
     ///
     /// # Errors
     /// Those of `make`.
@@ -92,7 +94,7 @@ impl Lengths {
         &self.whole
     }
 
-    /// The table of a run, with what shorter slides say.
+    /// The table of a run, with the statistics of shorter slides.
     fn learn(&self, run: u64, config: Config) -> Result<Vec<u8>, TableError> {
         let learn = |of: &Experiment| of.run(run).learn(config.method);
         let shorter = self.shorter.iter();
@@ -105,11 +107,11 @@ impl Lengths {
 /// One exploration, and where it could have ended.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Looked {
-    /// How it ended with whole slides.
+    /// Its end with whole slides.
     pub outcome: Outcome,
     /// Seconds of sliding until then, at constant speed.
     pub seconds: f64,
-    /// What was seen at each length of each slide, in the order of time, and the seconds of sliding until then.
+    /// The look at each length of each slide, in the order of time, and the seconds of sliding until then.
     pub looks: Vec<(Look, f64)>,
 }
 
@@ -119,7 +121,7 @@ pub struct Looked {
 /// See [`EvaluateError`].
 ///
 /// # Panics
-/// A slide lacks a property that the experiment says all have.
+/// A slide lacks a property that the experiment expects of all.
 pub fn look(
     lengths: &Lengths,
     config: Config,
@@ -169,27 +171,27 @@ fn look_at<const N: usize>(
         .expect("the first part of a slide has what the whole has")
 }
 
-/// How explorations ended, one way or the other.
+/// The ends of explorations, with whole or with shorter slides.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Ended {
     /// Mean seconds of sliding at constant speed until the verdict.
     pub seconds: f64,
-    /// Share of the explorations in which the right name was told as sure.
+    /// Share of the explorations with the right name as a sure verdict.
     pub right: f64,
-    /// Share of wrong names among those that were told as sure.
+    /// Share of wrong names among the sure verdicts.
     pub wrong_when_sure: f64,
 }
 
-/// What changes when slides may end at a doubt.
+/// The change if slides may end at a doubt.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Change {
     /// Most doubt with which a slide ends early.
     pub doubt: f64,
     /// Share of the explorations whose last slide ended early.
     pub early: f64,
-    /// How they end then.
+    /// Their ends.
     pub ended: Ended,
-    /// By how much that differs from whole slides.
+    /// Difference from whole slides.
     pub difference: Ended,
     /// Standard errors of these differences; explorations of one round, which share a table, count as one.
     pub error: Ended,
@@ -261,20 +263,20 @@ impl Looked {
     }
 }
 
-/// How explorations end with whole slides.
+/// The ends of explorations with whole slides.
 pub fn whole(looked: &[Looked]) -> Ended {
     let all = looked.iter().map(Looked::whole);
     all.fold(Sums::default(), Sums::add)
         .ended(looked.len() as f64)
 }
 
-/// What changes when slides may end at this doubt; so many explorations one after the other share a table.
+/// The change if slides may end at this doubt; so many explorations one after the other share a table.
 pub fn change(looked: &[Looked], round: usize, doubt: f64) -> Change {
     let runs = looked.len().max(1) as f64;
     let sum = |of: &dyn Fn(&Looked) -> Sums| looked.iter().map(of).fold(Sums::default(), Sums::add);
     let (before, after) = (sum(&Looked::whole), sum(&|l| l.cut(doubt)));
     let [was, is] = [before, after].map(|sums| sums.ended(runs));
-    // what a run adds to the difference: of shares among the sure, linearized
+    // contribution of a run to the difference: of shares among the sure, linearized
     let of_run = |looked: &Looked| {
         let (a, b) = (looked.cut(doubt), looked.whole());
         let share = |one: Sums, all: Sums, share: f64| {
@@ -424,9 +426,9 @@ mod tests {
             / 3.0)
             .sqrt();
         assert!((change.error.seconds - sd / 2.0).abs() < 1e-12);
-        // one round only says nothing of how rounds differ
+        // a single round does not show the spread between rounds
         assert!(super::change(&all, 4, 0.01).error.seconds.abs() < 1e-12);
-        // who doubts more ends none early
+        // a stricter doubt ends none early
         let strict = super::change(&all, 1, 1e-9);
         assert_eq!((strict.early, strict.difference.seconds), (0.25, -1.0));
     }

@@ -1,16 +1,16 @@
-//! What a table says of samples: whether they were moved or turned between the trials that it was learned from. A slide on the
-//! same track again says little about a texture.
+//! A table's notes of samples: true if they were moved or turned between the trials that it was learned from. A slide
+//! on the same track again shows little about a texture.
 
 use tactus_core::table::{EncodeError, Table, samples_length, with_moved};
 
-/// What is true of all of these; `None` where it is not known of one, they differ, or there is none.
+/// The common value of all of these; `None` if one is unknown, they differ, or there is none.
 pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
     let mut moved = moved.into_iter();
     let first = moved.next()??;
     moved.all(|other| other == Some(first)).then_some(first)
 }
 
-/// The table with this note of each texture, by its index, in place of what it says of that.
+/// The table with this note of each texture, by its index, in place of its old one.
 ///
 /// # Errors
 /// These bytes are no table.
@@ -27,19 +27,19 @@ pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>
     Ok(noted)
 }
 
-/// How the trials of a texture were made: what was said of those of a training, and of those before it.
+/// The treatment of a texture's sample between the trials of a training, and between those before it.
 #[derive(Debug, Default)]
 pub struct Trials {
     answers: Vec<Option<bool>>,
 }
 
 impl Trials {
-    /// This was said of the next ones, or is known of those before this training; `None`: nothing.
+    /// Takes the note of the next trials, or of those before this training; `None`: unknown.
     pub fn said(&mut self, moved: Option<bool>) {
         self.answers.push(moved);
     }
 
-    /// What was said before a trial, from 0. Of the first one nobody is asked: it is as all others are.
+    /// The note for a trial, from 0. The first one has no question of its own: it gets the note of all others.
     pub fn before_trial(&self, trial: usize) -> Option<bool> {
         match trial.checked_sub(1) {
             Some(asked) => *self.answers.get(asked)?,
@@ -47,24 +47,24 @@ impl Trials {
         }
     }
 
-    /// What is to be noted: what is true of all of them.
+    /// The note for the table: the common value of all trials.
     pub fn moved(&self) -> Option<bool> {
         of_all(self.answers.iter().copied())
     }
 }
 
-/// What becomes of a note on how the sample of a texture was treated.
+/// The result of noting the treatment of a texture's sample.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Noting {
-    /// The table says so already, or does not know the texture.
+    /// The table has the note already, or does not know the texture.
     Nothing,
     /// The table with the note, which the probe is to use.
     Table(Vec<u8>),
-    /// It cannot be noted, and why.
+    /// It cannot be noted; the reason.
     Impossible(&'static str),
 }
 
-/// Notes how the trials of a texture were made, in the table that a probe uses.
+/// Notes the treatment of a texture's sample in the table that a probe uses.
 ///
 /// # Errors
 /// These bytes are no table.
@@ -73,7 +73,7 @@ pub fn noting(bytes: &[u8], name: &str, moved: Option<bool>) -> Result<Noting, E
     let Some(texture) = table.find(name).filter(|&t| table.moved(t) != moved) else {
         return Ok(Noting::Nothing);
     };
-    // it cannot be read without what the probe has learned by itself, which must not become a part of it
+    // it cannot be read without the probe's own learning, which must not become a part of it
     if (0..table.textures()).any(|texture| table.tally(texture).itself > 0) {
         return Ok(Noting::Impossible(
             "the probe has learned by itself, and its table cannot be replaced without mixing that in",
@@ -93,7 +93,7 @@ pub fn fewest(table: Table<'_>, name: &str) -> Option<u8> {
     movements.map(|(m, _)| table.trials(texture, m)).min()
 }
 
-/// What a table says of its samples, in words.
+/// The table's notes of its samples, in words.
 pub fn in_words(table: Table<'_>) -> String {
     let of = |wanted: Option<bool>| -> Vec<&str> {
         let textures = (0..table.textures()).filter(|&texture| table.moved(texture) == wanted);
@@ -119,12 +119,12 @@ pub fn in_words(table: Table<'_>) -> String {
     format!("samples, {}", parts.join("; "))
 }
 
-/// What would help where samples never moved; `None` where there are none.
+/// Advice for samples that never moved; `None` if there are none.
 pub fn advice(stayed: &[&str]) -> Option<String> {
     (!stayed.is_empty()).then(|| {
         format!(
-            "Learned at one spot: {}. A slide on the same track again says little about a texture, so it may not be known at \
-             other spots, or turned: learn it again, and move or turn the sample between trials.",
+            "Learned at one spot: {}. A slide on the same track again says little about a texture, so it may not be \
+             known at other spots, or turned: learn it again, and move or turn the sample between trials.",
             stayed.join(", ")
         )
     })

@@ -15,7 +15,7 @@ use super::message::{File, Folder, Frame, Question};
 use super::say::{NameError, after};
 use super::verifying::NoReference;
 use crate::data::recordings::RecordingError;
-use crate::live::{Happening, Hearing, Known};
+use crate::live::{Happening, KnownTable, ProbeMonitor};
 use tactus_link::exchange::{BOOTING, Exchange, GREETING, PortError, TIMEOUT, is_up};
 use tactus_link::lifting::{Lifting, RigHeard, Stopped, moves};
 use tactus_link::log::Line as Logged;
@@ -78,7 +78,7 @@ impl Write for Out {
 struct Told {
     rig: RigHeard,
     log: Vec<u8>,
-    hearing: Hearing,
+    monitor: ProbeMonitor,
     live: Option<Live>,
     phase: Option<Phase>,
     at_ms: u32,
@@ -96,7 +96,7 @@ impl Told {
             Event::Live(live) => self.live = Some(*live),
             _ => {}
         }
-        self.hearing.hear(report.event.clone());
+        self.monitor.hear(report.event.clone());
         Ok(())
     }
 }
@@ -108,7 +108,7 @@ struct Line {
     now: Duration,
     closed: bool,
     told: Told,
-    known: Option<Known>,
+    known: Option<KnownTable>,
     connected: bool,
     busy: bool,
     stop: bool,
@@ -200,7 +200,7 @@ impl Bench {
     /// What has been since the last one.
     pub(super) fn frame(&self) -> Frame {
         let line = &mut *self.line.borrow_mut();
-        let heard = line.told.hearing.take();
+        let heard = line.told.monitor.take();
         let live = line.told.live.as_ref();
         let of = |value: fn(&Live) -> f64| live.map_or(0.0, |live| value(live) * 1e-3);
         let said = std::mem::take(&mut *self.out.0.borrow_mut());
@@ -252,7 +252,7 @@ impl Bench {
 
     /// An exploration begins; without a table that is known nothing follows it.
     pub(super) fn explores(&self, config: tactus_core::explorer::Config) {
-        self.line.borrow_mut().told.hearing.explores(config);
+        self.line.borrow_mut().told.monitor.explores(config);
     }
 
     /// Frames that were damaged and reports that were lost.
@@ -264,7 +264,7 @@ impl Bench {
 
     /// Something that the probe said is to be shown.
     pub(super) fn happens(&self, what: Happening) {
-        self.line.borrow_mut().told.hearing.happens(what);
+        self.line.borrow_mut().told.monitor.happens(what);
     }
 
     /// Asks, and waits for the answer; `None`: the user stops it.
@@ -310,9 +310,9 @@ impl Bench {
     pub(super) async fn table(&self) -> Result<Vec<u8>, WorkError> {
         let bytes = self.get(ReadTable::default()).await?;
         let line = &mut *self.line.borrow_mut();
-        line.told.hearing.knows(&bytes);
-        line.told.hearing.learned();
-        line.known = Some(line.told.hearing.known().clone());
+        line.told.monitor.knows(&bytes);
+        line.told.monitor.learned();
+        line.known = Some(line.told.monitor.known().clone());
         Ok(bytes)
     }
 

@@ -14,7 +14,7 @@ use crate::data::replay::measure;
 use crate::eval::learn::learn;
 use crate::eval::show::count;
 use crate::eval::transcript::Answer;
-use crate::live::{Expected, Happening, Hearing, Measured, Standing, spectra, world_table};
+use crate::live::{Expected, Happening, Measured, ProbeMonitor, Standing, spectra, world_table};
 use crate::sim::collection::Collection;
 
 /// Slides of each texture at a movement of which one can be left out: a table needs two.
@@ -259,11 +259,11 @@ impl Recorded {
         let Ok(mut explorer) = explorer.map(Box::new) else {
             return;
         };
-        let mut hearing = Hearing::default();
-        hearing.knows(&judge.table);
+        let mut monitor = ProbeMonitor::default();
+        monitor.knows(&judge.table);
         frame
             .tables
-            .push((frame.happened.len(), hearing.known().clone()));
+            .push((frame.happened.len(), monitor.known().clone()));
         for texture in judge
             .slides
             .chunk_by(|a, b| self.slides[*a].texture == self.slides[*b].texture)
@@ -302,7 +302,7 @@ impl Recorded {
                     early_ms: None,
                     measured: Measured::new(slide.movement, &seen),
                     standing: Standing::of(&explorer),
-                    place: hearing.place_of(table, movement, &seen),
+                    place: monitor.place_of(table, movement, &seen),
                 });
             }
             if explorer.slides() > 0 {

@@ -7,7 +7,7 @@ use super::message::Frame;
 use super::verifying::{Verifying, config_of, words};
 use crate::eval::show::count;
 use crate::eval::verified::{Slide, print_answer, print_slide};
-use crate::live::{Happening, Hearing};
+use crate::live::{Happening, ProbeMonitor};
 use tactus_link::log::{self, Line, LogError};
 
 /// Everything that a log says of its explorations and verifications.
@@ -41,7 +41,7 @@ pub(super) fn replay(log: &[u8]) -> Result<Frame, LogError> {
 /// A session that is heard again.
 #[derive(Default)]
 pub(super) struct Replay {
-    hearing: Hearing,
+    monitor: ProbeMonitor,
     /// the one in use
     table: Vec<u8>,
     verification: Option<(Identify, Vec<Event>)>,
@@ -62,9 +62,9 @@ impl Replay {
     /// The probe uses this table from now on.
     pub(super) fn table(&mut self, whole: Vec<u8>) {
         self.judged();
-        self.hearing.knows(&whole);
+        self.monitor.knows(&whole);
         self.take();
-        let known = self.hearing.known().clone();
+        let known = self.monitor.known().clone();
         self.frame.tables.push((self.frame.happened.len(), known));
         self.table = whole;
     }
@@ -76,7 +76,7 @@ impl Replay {
                 self.judged();
                 let config = self.in_use().map(|table| asked.config(table.contents()));
                 if let Some(config) = config {
-                    self.hearing.explores(config);
+                    self.monitor.explores(config);
                 }
             }
             Command::Verify(asked) => {
@@ -91,13 +91,13 @@ impl Replay {
     pub(super) fn said(&mut self, at_ms: u32, event: Event) {
         self.frame.at_ms = at_ms;
         let Some((_, events)) = &mut self.verification else {
-            self.hearing.hear(event);
+            self.monitor.hear(event);
             return;
         };
         match event {
             Event::Done(_) => self.judged(),
             Event::Rejected { .. } | Event::Refused { .. } | Event::Trouble(_) => {
-                self.hearing.hear(event);
+                self.monitor.hear(event);
             }
             event => {
                 let judges = matches!(event, Event::Verified { .. });
@@ -107,7 +107,7 @@ impl Replay {
                     false => None,
                 };
                 if let Some(slide) = judged {
-                    self.hearing.happens(Happening::Judged {
+                    self.monitor.happens(Happening::Judged {
                         slide: slide.number,
                         answer: slide.answer,
                         said: words(|out| print_slide(&slide, out)),
@@ -120,7 +120,7 @@ impl Replay {
     /// It said why something came to nothing.
     pub(super) fn refused(&mut self, at_ms: u32, why: &str) {
         self.frame.at_ms = at_ms;
-        self.hearing.happens(Happening::Refused {
+        self.monitor.happens(Happening::Refused {
             why: why.to_owned(),
         });
     }
@@ -146,7 +146,7 @@ impl Replay {
         self.verification = None;
         if let Some(verified) = verified {
             let said = words(|out| print_answer(&verified, out));
-            self.hearing.happens(Happening::Verified {
+            self.monitor.happens(Happening::Verified {
                 answer: verified.answer,
                 said,
             });
@@ -154,7 +154,7 @@ impl Replay {
     }
 
     fn take(&mut self) {
-        let heard = self.hearing.take();
+        let heard = self.monitor.take();
         self.frame.pac.extend(heard.pac);
         self.frame.spectra.extend(heard.spectra);
         self.frame.happened.extend(heard.happened);

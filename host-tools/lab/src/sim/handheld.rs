@@ -1,4 +1,4 @@
-//! The handheld probe in the simulated world: a hand that does what the display says, and the table that is learned from it.
+//! The handheld probe in the simulated world: a hand that follows the display, and the table that is learned from it.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -25,12 +25,12 @@ use tactus_world::world::{Setup, Truth, World};
 const READING_SLOTS: u64 = SLOTS_HZ as u64 / 100;
 /// From the sound to the slide, s (chosen).
 const REACTION_S: (f64, f64) = (0.2, 0.5);
-/// How long a person slides, s: until the bar is full, and a little more.
+/// Duration of a person's slide, s: until the bar is full, and a little more.
 const SLIDE_S: f64 = 1.8;
 /// Attempts that a person makes before giving up on a texture.
 const ATTEMPTS: u32 = 10;
 
-/// Why no slide over a texture was good.
+/// Reasons why no slide over a texture was good.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HandError {
     /// One attempt after the other was no good.
@@ -41,12 +41,12 @@ pub enum HandError {
     NoGoodSlide {
         /// Number of the texture in Table 1.
         texture: u8,
-        /// What the last slide was; `None` if none was noticed.
+        /// Fault of the last slide; `None` if none was noticed.
         why: Option<Again>,
     },
 }
 
-/// A texture as an optical sensor of motion at this height sees it: nothing of glass and of what is polished (chosen).
+/// A texture as an optical sensor of motion at this height sees it: no surface for glass and polished ones (chosen).
 pub fn ground(texture: u8, height_mm: f64) -> Ground {
     let name = texture_name(texture).to_lowercase();
     if name.contains("glass") || name.contains("polished") {
@@ -68,7 +68,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Somebody who holds the probe over the texture of `setup`.
+    /// A person who holds the probe over the texture of `setup`.
     pub fn new(setup: Setup, manner: Manner) -> Self {
         let mut world = World::new(setup);
         world.hold(Hand::new(setup.trial_seed, manner));
@@ -107,14 +107,14 @@ impl Person {
             })
     }
 
-    /// What the hand means to do from now on.
+    /// Sets the intention of the hand.
     pub fn intend(&mut self, force_n: f64, pace_mm_s: f64) {
         if let Some(hand) = self.world.hand() {
             hand.intend(force_n, pace_mm_s);
         }
     }
 
-    /// What is really so.
+    /// The ground truth.
     pub fn truth(&self) -> Truth {
         self.world.truth()
     }
@@ -147,7 +147,7 @@ impl Person {
         None
     }
 
-    /// Presses and slides as one is asked to: the slide, or what was wrong with it; `None` if nothing was noticed.
+    /// Presses and slides as the probe prompts: returns the slide, or its fault; `None` if nothing was noticed.
     pub fn slide(&mut self, touch: &mut Touch<'_>) -> Option<Result<Observation, Again>> {
         let target_n = f64::from(<(u16, u32)>::from(MOVEMENT).0) * 1e-3;
         let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
@@ -180,7 +180,7 @@ impl Person {
     }
 }
 
-/// So many good slides of a texture by one person, and how many others there were.
+/// So many good slides of a texture by one person, and the number of other ones.
 ///
 /// # Errors
 /// See [`HandError`].
@@ -357,7 +357,7 @@ mod tests {
                 let (good, _) = slides(world.setup(texture, seed), LEVEL, 1).unwrap();
                 good.first().unwrap().pace
             };
-            // 3 %: what has not come up to speed, frames, counts
+            // 3 %: the part before full speed, frames, counts
             let measured = pace(burlap).unwrap();
             assert!(measured.abs() < 31, "{seed}: {measured}");
             assert_eq!(pace(glass), None, "{seed}");
@@ -435,8 +435,8 @@ mod tests {
     /// Slides of a touch in [`what_more_slides_tell`].
     const MOST: usize = 12;
 
-    /// Explores touches that the factory's table of a finger was not learned from: how many, and of how many, after 1 to [`MOST`] slides, the right
-    /// texture is sure, another one is, and none is said to fit.
+    /// Explores touches that the factory's table of a finger was not learned from: their number, and after 1 to
+    /// [`MOST`] slides the numbers of those that are sure and right, sure and wrong, and unknown.
     fn explore_factory(
         finger: FingerName,
         trials: std::ops::Range<u64>,
@@ -489,7 +489,7 @@ mod tests {
             }
             let after = |slides: usize| counts[slides - 1];
             let [asked, last, more] = [ASK_AFTER, MAX_SLIDES, MOST].map(after);
-            // of a hundred: going on tells five more, and none of them wrong
+            // of a hundred: five more slides identify five more, and none of them wrong
             assert!(
                 100 * (last[0] - asked[0]) >= 5 * all,
                 "{finger}: {counts:?}"
@@ -498,7 +498,7 @@ mod tests {
                 last[1] <= asked[1] + all / 100 && last[1] <= 2,
                 "{finger}: {counts:?}"
             );
-            // and more than that tells two more at most
+            // and further slides identify two more at most
             assert!(100 * (more[0] - last[0]) <= 2 * all, "{finger}: {counts:?}");
         }
     }

@@ -1,5 +1,5 @@
-//! The simulated rig: the world of [`tactus_world`] at one end of the pins, the core's [`Control`] at the other, and what the
-//! board's timers do in between, in virtual time.
+//! The simulated rig: the world of [`tactus_world`] at one end of the pins, the core's [`Control`] at the other, and
+//! the work of the board's timers in between, in virtual time.
 
 use std::time::Duration;
 
@@ -35,7 +35,7 @@ fn amperes(adc: u16) -> f32 {
     (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
 }
 
-/// Why the simulated rig did not make a movement.
+/// Reasons why the simulated rig did not make a movement.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// It was refused.
@@ -47,13 +47,13 @@ pub enum SimError {
     /// It was stopped.
     #[error("stopped")]
     Stopped,
-    /// Nothing came of it in two minutes of virtual time.
+    /// It did not end in two minutes of virtual time.
     #[error("the rig hangs in {0:?}")]
     Hangs(Phase),
-    /// A calibration came to nothing.
+    /// A calibration failed.
     #[error(transparent)]
     Calibration(#[from] RigCalibrationError),
-    /// The sensor does not say what it is.
+    /// The sensor does not identify itself.
     #[error(transparent)]
     Sensor(#[from] biotac::PropertyError),
     /// A part of the finger does not start.
@@ -85,10 +85,10 @@ pub struct SimRig {
     listener: Option<(Watch, Listener)>,
 }
 
-/// Hears what a probe with this rig would report of a slide, with the time in ms.
+/// Gets the reports of a probe with this rig about a slide, with the time in ms.
 pub type Listener = Box<dyn FnMut(u32, Event) + Send>;
 
-/// How a slide was really made: the world's truth, which the control does not know.
+/// The ground truth of a slide, which the control does not know.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Performed {
     /// Contact force when the slide began, N.
@@ -97,7 +97,7 @@ pub struct Performed {
     pub force_max_n: f64,
     /// Mean speed of the steady part, mm/s.
     pub speed_mm_s: f64,
-    /// How long that was, s.
+    /// Duration of that, s.
     pub steady_s: f64,
     /// Largest relative deviation of the mean speed of any 100 ms of the steady part.
     pub speed_error: f64,
@@ -152,17 +152,17 @@ impl SimRig {
         }
     }
 
-    /// From now on `listener` hears of every slide: its phases, where the rig is, and the samples.
+    /// Calls `listener` for every slide from now on: with its phases, the state of the rig, and the samples.
     pub fn listen(&mut self, listener: Listener) {
         self.listener = Some((Watch::default(), listener));
     }
 
-    /// How every slide so far was really made.
+    /// The ground truth of every slide so far.
     pub fn performed(&self) -> &[Performed] {
         &self.performed
     }
 
-    /// How every slide was really made since this was asked for last.
+    /// Takes the ground truth of every slide since the last call.
     pub fn take_performed(&mut self) -> Vec<Performed> {
         std::mem::take(&mut self.performed)
     }
@@ -177,7 +177,7 @@ impl SimRig {
         &mut self.world
     }
 
-    /// Gravity along the finger as its decoder says, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
+    /// Gravity along the finger by its decoder, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
     pub fn gravity(&self) -> Option<f32> {
         self.reader.gravity()
     }
@@ -187,7 +187,7 @@ impl SimRig {
         &mut self.control
     }
 
-    /// What the rig is doing, as a probe shows it; how the last movement ended is for the caller to remember.
+    /// State of the rig, as a probe shows it; the caller remembers the end of the last movement.
     pub fn state(&mut self, ended: Option<Ended>) -> RigState {
         RigState::of(&mut self.control, self.steps, self.current_a, ended)
     }
@@ -202,7 +202,7 @@ impl SimRig {
         &self.pdc
     }
 
-    /// What the control last set the pins to.
+    /// The last outputs of the control.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
@@ -265,7 +265,7 @@ impl SimRig {
         &self.outputs
     }
 
-    /// When the next slot is due, from a timer of 4400 Hz: no drift, and no overflow.
+    /// Time of the next slot, from a timer of 4400 Hz: no drift, and no overflow.
     fn slot_ns(&self) -> u64 {
         let hz = u64::from(SLOTS_HZ);
         let (seconds, slot) = (self.slot / hz, self.slot % hz);
@@ -313,7 +313,7 @@ impl SimRig {
         }
     }
 
-    /// Lets the rig go on until it is at rest: ready, parked or faulted with the finger off the sample.
+    /// Runs the rig until it is at rest: ready, parked or faulted with the finger off the sample.
     ///
     /// # Errors
     /// The fault that it came to, or that it never came to rest.
@@ -374,8 +374,8 @@ impl SimRig {
         Ok(())
     }
 
-    /// Makes one movement, beginning at `start` (0 to 1 of the room that the sample leaves); `each` sees what every tick
-    /// set the pins to.
+    /// Makes one movement, beginning at `start` (0 to 1 of the length that the sample leaves); `each` gets the outputs
+    /// of every tick.
     ///
     /// # Errors
     /// See [`SimError`]. The stage stands then, and the finger is lifted.
@@ -391,7 +391,7 @@ impl SimRig {
         })
     }
 
-    /// As [`SimRig::slide`]; the slide ends early when `each` says so.
+    /// As [`SimRig::slide`]; the slide ends early when `each` returns so.
     fn slide_until(
         &mut self,
         movement: Movement,
@@ -453,8 +453,8 @@ impl SimRig {
         }
     }
 
-    /// Makes one movement and records it; a slide with a gap is repeated, and one that failed in a way that the rig gets over
-    /// by itself. Texture and number are left at 0.
+    /// Makes one movement and records it; repeats a slide with a gap, and one that failed with an error that the rig
+    /// recovers from by itself. Texture and number are left at 0.
     ///
     /// # Errors
     /// See [`SimError`].
@@ -488,7 +488,7 @@ impl SimRig {
         Err(failed)
     }
 
-    /// Whether the rig can go on after this failure; it has homed then, if it had to.
+    /// Returns true if the rig can continue after this failure; it has homed then, if it had to.
     fn go_on(&mut self, failed: &SimError) -> bool {
         match *failed {
             SimError::Refused(why) => RigError::from(why).is_of_the_movement(),

@@ -1,5 +1,5 @@
-//! What `tactus evaluate` draws: what was told of each texture, how often it was right when it said so, and what another
-//! threshold would change.
+//! Pictures of `tactus evaluate`: the verdicts on each texture, the reliability of the probabilities, and the effect of
+//! another threshold.
 
 use tactus_core::explorer::Told;
 
@@ -8,7 +8,7 @@ use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
 use tactus_lab::eval::courses::Course;
 use tactus_lab::eval::reliability::{self, Statements, statements, verdicts};
 
-/// The three pictures of explorations that went like this, among textures of these names, at this threshold.
+/// The three pictures of these explorations, among textures of these names, at this threshold.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -28,7 +28,7 @@ pub fn figures(
 /// More names than this are written as numbers below the columns, and no share is written into a cell.
 const FEW: usize = 12;
 
-/// What was told, row by row: textures presented, and columns of what was told.
+/// Verdicts, row by row: presented textures, and columns of verdicts.
 fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Figure, DrawError> {
     let known = names.len();
     let mut counts = vec![vec![0_u64; known + 3]; known];
@@ -84,7 +84,8 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
     let columns = numbers.chain(["C", "N", "?"].map(str::to_owned));
     let verdicts = verdicts(courses, threshold);
     let about = format!(
-        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, {:.1} % with none of those known and {:.1} % undecided.",
+        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, \
+         {:.1} % with none of those known and {:.1} % undecided.",
         courses.len(),
         100.0 * verdicts.right,
         100.0 * verdicts.wrong,
@@ -93,13 +94,15 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
         100.0 * verdicts.undecided
     );
     let below = if known > FEW {
-        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
+        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of \
+         those known (N), not sure (?)."
     } else {
-        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
+        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those \
+         known (N), not sure (?)."
     };
     Grid {
         id: "confusion".to_owned(),
-        title: format!("What is told of each texture, at {} %", percent(threshold)),
+        title: format!("Verdicts on each texture, at {} %", percent(threshold)),
         about: &about,
         x: ("told: the texture of this number", columns.collect()),
         y: ("presented", rows.collect()),
@@ -114,7 +117,7 @@ fn percent(share: f32) -> f64 {
     (f64::from(share) * 1e6).round() / 1e4
 }
 
-/// Between which shares the true one is, 95 times of 100, if `right` of `count` were found (Wilson 1927).
+/// Confidence interval of 95 % for the true share, if `right` of `count` were found (Wilson 1927).
 fn wilson(right: u64, count: u64) -> (f64, f64) {
     const Z: f64 = 1.96;
     let (n, p) = (count as f64, right as f64 / count as f64);
@@ -131,7 +134,7 @@ fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> 
         "was right (bar: 95 % of such counts)",
         Vec::new(),
     );
-    let mut said = Series::dashed("what it said (mean)", Vec::new());
+    let mut said = Series::dashed("as stated (mean)", Vec::new());
     for (bin, x) in bins.iter().zip(1..).filter(|(bin, _)| bin.count > 0) {
         let (x, of) = (f64::from(x), bin.count as f64);
         let mean = 100.0 * bin.said.unwrap_or_default();
@@ -182,7 +185,7 @@ fn range(bin: &Statements) -> String {
     }
 }
 
-/// Slides, and what is told, by the threshold.
+/// Slides, and verdicts, by the threshold.
 fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawError> {
     let by_threshold = reliability::by_threshold(courses, threshold);
     let thresholds: Vec<f32> = by_threshold.iter().map(|at| at.threshold).collect();

@@ -1,11 +1,11 @@
-//! Why a report cannot be written.
+//! Reasons why a report cannot be written.
 
 use std::io;
 use std::path::PathBuf;
 
 use crate::chart::DrawError;
 
-/// Why a report cannot be written.
+/// Reasons why a report cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder has something in it.
@@ -19,7 +19,7 @@ pub enum ReportError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// A figure failed.

@@ -1,4 +1,4 @@
-//! What a report is made of: tables, figures, and the numbers that its page puts between its words.
+//! The parts of a report: tables, figures, and the numbers that its page puts between its words.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use tactus_core::features::Property;
 
 use crate::chart::Figure;
 
-/// All that a study shows: the page's template says where each piece stands and what is said about it.
+/// The contents of a report: the page's template gives the place of each piece and the text about it.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Report {
     /// Tables that the page shows, by the names of their files.
@@ -18,7 +18,7 @@ pub(super) struct Report {
     pub(super) files: BTreeMap<String, Table>,
     /// The panels of the page's figures, by figure.
     pub(super) figures: BTreeMap<&'static str, Vec<Figure>>,
-    /// What stands between the words, by section.
+    /// Values in the text, by section.
     #[serde(flatten)]
     pub(super) words: BTreeMap<&'static str, Value>,
 }
@@ -88,15 +88,15 @@ impl Table {
 /// A cell of a table.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Cell {
-    /// What people see.
+    /// The text for people.
     shown: String,
-    /// What files have: all digits.
+    /// The text for files: all digits.
     #[serde(skip)]
     exact: String,
     number: bool,
 }
 
-/// The cells of a row: words, and numbers with how many decimals of them people see.
+/// The cells of a row: words, and numbers with the number of decimals for people.
 macro_rules! cells {
     ($($cell:expr),* $(,)?) => { vec![$($crate::report::model::Cell::from($cell)),*] };
 }

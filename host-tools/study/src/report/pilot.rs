@@ -12,7 +12,7 @@ use crate::published::PILOT_TRIALS;
 /// The textures of fig. 6 whose centroid rises with speed.
 const COARSE: [u8; 4] = [10, 30, 87, 100];
 
-/// Adds what the pilot study found.
+/// Adds the results of the pilot study.
 pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
     let useful = |m: &MostUseful| {
         let left = |at: usize| (pilot.movements[at].uncertainty[m.property.index()], 3);
@@ -113,7 +113,7 @@ pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// What stands in place of the uncertainty of a movement that the rig could not make on every texture.
+/// Text in place of the uncertainty of a movement that the rig could not make on every texture.
 fn not_reached(m: &PilotMovement) -> Option<String> {
     let missed = |m: &Missed| format!("T{}, trial {}: {}", m.texture, m.trial, m.reason);
     let missed: Vec<String> = m.not_reached.iter().map(missed).collect();
@@ -176,7 +176,7 @@ fn fig6(pilot: &Pilot) -> Result<Figure, DrawError> {
     .figure("fig6")
 }
 
-/// Uncertainty by force and speed: the least is framed, what wears the skin is grey.
+/// Uncertainty by force and speed: the least is framed, movements that wear the skin are grey.
 fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
     let property = useful.property;
     let left = |m: &PilotMovement| f64::from(m.uncertainty[property.index()]);

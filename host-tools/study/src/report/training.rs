@@ -9,10 +9,10 @@ use crate::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, buffer};
 use crate::published::{MOST_USEFUL, TRIALS};
 use crate::training::Training;
 
-/// What the axes of textures show.
+/// Label of the axes of textures.
 const TEXTURES: &str = "number of the texture (Table 1)";
 
-/// Adds what the training found.
+/// Adds the results of the training.
 pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawError> {
     let names: Vec<String> = training
         .movements
@@ -82,7 +82,18 @@ pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawEr
     let changed = skin.changed_before.iter().map(|t| format!("T{}", t.number));
     let textures = training.textures.iter();
     let names: Vec<String> = textures.map(|t| t.texture.name.to_string()).collect();
-    let words = json!({"names": names, "slides": training.textures.len() * training.movements.len() * TRIALS as usize, "between_movements": training.between_movements.map(|c| format!("{c:.2}")), "white": SHADES[0].to_string(), "black": SHADES[4].to_string(), "pairs_confused": training.pairs_confused, "changed": changed.collect::<Vec<_>>(), "changed_at": format!("{:.0}", skin.changed_at), "paper_changes": skin.paper_changes, "matrices": matrices});
+    let words = json!({
+        "names": names,
+        "slides": training.textures.len() * training.movements.len() * TRIALS as usize,
+        "between_movements": training.between_movements.map(|c| format!("{c:.2}")),
+        "white": SHADES[0].to_string(),
+        "black": SHADES[4].to_string(),
+        "pairs_confused": training.pairs_confused,
+        "changed": changed.collect::<Vec<_>>(),
+        "changed_at": format!("{:.0}", skin.changed_at),
+        "paper_changes": skin.paper_changes,
+        "matrices": matrices,
+    });
     report.words.insert("training", words);
     Ok(())
 }
@@ -96,7 +107,7 @@ fn add_matrix(report: &mut Report, id: &str, of: &[Vec<f32>]) {
     report.file(id, header, rows.collect());
 }
 
-/// Adds the file of what was learned of every texture.
+/// Adds the file of the learned Gaussians of every texture.
 fn trained(training: &Training, report: &mut Report) {
     let mut header = owned(&["texture", "name"]);
     for m in 1..=training.movements.len() {
@@ -190,7 +201,7 @@ fn wear(training: &Training) -> Result<Figure, DrawError> {
     .figure("skin-during-training")
 }
 
-/// What wear does to roughness, by movement.
+/// Effect of wear on roughness, by movement.
 fn roughness(training: &Training) -> Result<Figure, DrawError> {
     let mut series = Vec::new();
     for (m, &movement) in training.movements.iter().enumerate() {

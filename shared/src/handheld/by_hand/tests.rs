@@ -39,7 +39,7 @@ struct Obedient {
     prompt: Option<Prompt>,
     /// Ticks since it changed.
     since: u32,
-    /// The contact force that it means by "press", mN.
+    /// Contact force of this person's press, mN.
     presses_mn: f32,
     /// mN of a count of this finger.
     mn_per_count: f32,
@@ -50,9 +50,9 @@ struct Obedient {
     stops: Option<u32>,
     ticks: u32,
     streams: bool,
-    /// Instead of this weight another one is put on, mN.
+    /// Another weight that is put on instead of this one, mN.
     wrong: Option<u16>,
-    /// What 1 g makes, and 0, counts.
+    /// Readings at 1 g and at 0 g, counts.
     g: (f32, f32),
 }
 
@@ -78,7 +78,7 @@ impl Obedient {
         }
     }
 
-    /// Force and vibration of now.
+    /// Force and vibration at this moment.
     fn does(&self) -> (f32, f32) {
         match self.prompt {
             Some(Prompt::Press) => (self.presses_mn, 0.0),
@@ -94,7 +94,9 @@ impl Obedient {
 }
 
 impl Hand for Obedient {
-    const FEELS_GRAVITY: bool = true;
+    fn feels_gravity(&self) -> bool {
+        true
+    }
 
     fn gravity(&self) -> Option<f32> {
         let (g, zero) = self.g;
@@ -208,7 +210,7 @@ fn a_person_makes_the_slide_that_is_asked_for_and_its_samples_are_the_hosts() {
     let expected = [Prompt::Lift, Prompt::Press, Prompt::Slide, Prompt::Lift];
     assert_eq!(prompts(&rig), expected);
     assert_eq!(rig.hand.shown, ["Press", "Slide", "Lift"]);
-    // the same slide, from what was streamed
+    // the same slide, from the streamed samples
     let mut streamed = Slide::new(&plan, MOVEMENT);
     let (mut pdc, mut steady) = (List::new(), 0..0);
     for event in &rig.hand.told {
@@ -311,7 +313,7 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
     block_on(rig.perform(&mut slide)).unwrap();
     let force_mn = rig.state().force_mn;
     assert!((force_mn - 500.0).abs() < 15.0, "{force_mn}");
-    // what is no weight at all is waited for in vain
+    // no weight at all: the wait ends without result
     rig.hand.prompt = None;
     rig.hand.stops = Some(rig.hand.ticks + 200);
     rig.hand.mn_per_count = 1e6;
@@ -346,7 +348,7 @@ fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
     let mg = set.pressure.pac_pa_per_count;
     assert!((mg * 0.994 - 1.0).abs() < 1e-3, "{mg}");
     assert_eq!(set.turned, RigCalibration::UNDATED);
-    // the force is what it was
+    // the force is the same as before
     assert_eq!(set.scale_day(), None);
     assert_eq!(prompts(&rig), [Prompt::Still, Prompt::TurnOver]);
     let about = About::default();
@@ -367,7 +369,7 @@ fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
         store = block_on(Store::open(flash)).unwrap();
         assert_eq!(block_on(store.calibration()), Ok(Some(set)));
     }
-    // it lies on its side until nobody waits any more
+    // it lies on its side until the wait is over
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     rig.hand.g = (0.0, 0.0);
     block_on(rig.set_gravity(&mut memory));
@@ -382,7 +384,7 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     let mut rig = held(&plan);
     rig.serves = false;
-    // somebody stopped a host's request before
+    // a host's request was stopped before
     rig.hand.stops = Some(0);
     rig.hand.mn_per_count = 14.0;
     block_on(rig.set_force(&mut memory));
@@ -435,7 +437,7 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
     let flash = memory.close().0.unwrap().close().again();
     let mut store = block_on(Store::open(flash)).unwrap();
     assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-    // who gives up is back where they were
+    // a person who gives up is back at the start
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     rig.hand.gives_up = Some(rig.hand.ticks + 400);
     block_on(rig.set_force(&mut memory));
@@ -484,7 +486,7 @@ fn what_the_host_found_out_is_shown() {
     assert_eq!(leading, [(1, 0.6), (3, 0.25), (0, 0.1)]);
     assert!(!judgement.sure && !judgement.open);
     assert!(shown.judgement().is_none());
-    // whether it is one texture
+    // the question about one texture
     for (answer, sure, unknown) in [
         (Answer::Same, true, false),
         (Answer::Different, false, true),

@@ -5,7 +5,6 @@ use embedded_graphics::pixelcolor::BinaryColor;
 
 use super::letters::{LARGE, SMALL};
 use super::{Brush, Done, say};
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 
@@ -13,7 +12,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     pub(super) fn weigh(&mut self, mn: u16, force_mn: f32) -> Done<D> {
         self.title("Calibrate", "keep still")?;
         self.centre("Put on", 13, &LARGE)?;
-        // what is written on weights
+        // the figure written on weights
         let grams = (u32::from(mn) * 1000 + 4903) / 9807;
         self.centre(&say(format_args!("{grams} g")), 32, &LARGE)?;
         let reads = force_mn as u16;
@@ -37,7 +36,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.sentence("Force is set", &text)
     }
 
-    #[cfg(any(feature = "turns", test))]
     pub(super) fn turn(&mut self, over: bool) -> Done<D> {
         self.title("Calibrate", "keep still")?;
         let (first, second) = if over {
@@ -49,7 +47,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.centre(second, 38, &LARGE)
     }
 
-    #[cfg(any(feature = "turns", test))]
     pub(super) fn turned(&mut self, turned: &Turned) -> Done<D> {
         let off = (turned.offset_counts / turned.g_counts * 1e3) as i16;
         let text = say(format_args!(

@@ -1,4 +1,4 @@
-//! The lists that one button goes through: what to do, which texture to compare with, what a texture can be called.
+//! The lists that one button goes through: the menu, the texture to compare with, the name of a texture.
 
 use heapless::Vec;
 
@@ -17,14 +17,14 @@ pub enum Choice {
     Spelled(Name),
 }
 
-/// What is chosen from a list.
+/// The lists.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum List {
-    /// What to do.
+    /// The menu.
     Menu,
     /// The texture that the next slides are compared with.
     Reference,
-    /// What the texture is called that was touched.
+    /// The name of the touched texture.
     Name,
 }
 
@@ -38,12 +38,11 @@ impl List {
     }
 }
 
-/// What can be chosen.
+/// The entries of the lists.
 pub(super) enum Entry {
     Compare,
     About,
     SetForce,
-    #[cfg(any(feature = "turns", test))]
     TurnOver,
     Known(u16),
     Numbered,
@@ -51,22 +50,20 @@ pub(super) enum Entry {
     Nothing,
 }
 
-/// A list, by a table of so many textures and what was judged last.
+/// A list, with the number of textures in the table and the last judgement.
 #[derive(Clone, Copy)]
 pub(super) struct Entries<'j> {
     pub(super) list: List,
     pub(super) judgement: Option<&'j Judgement>,
     pub(super) textures: u16,
-    #[cfg(any(feature = "turns", test))]
     pub(super) turns: bool,
 }
 
 impl<'j> Entries<'j> {
-    /// How many there are. Names: the leading textures, a new one with a number, a new one that is spelled, nothing, and all
-    /// other textures.
+    /// Number of entries. Names: the leading textures, a new one with a number, a new one that is spelled, nothing, and
+    /// all other textures.
     pub(super) fn count(self) -> u16 {
         match self.list {
-            #[cfg(any(feature = "turns", test))]
             List::Menu if self.turns => 5,
             List::Menu => 4,
             List::Reference => self.textures.saturating_add(1),
@@ -80,13 +77,12 @@ impl<'j> Entries<'j> {
         leading.map(|(texture, _)| *texture)
     }
 
-    /// What an entry stands for.
+    /// The meaning of an entry.
     pub(super) fn entry(self, at: u16) -> Entry {
         match (self.list, at) {
             (List::Menu, 0) => return Entry::Compare,
             (List::Menu, 1) => return Entry::About,
             (List::Menu, 2) => return Entry::SetForce,
-            #[cfg(any(feature = "turns", test))]
             (List::Menu, 3) if self.turns => return Entry::TurnOver,
             (List::Reference, at) if at < self.textures => return Entry::Known(at),
             (List::Menu | List::Reference, _) => return Entry::Nothing,
@@ -124,7 +120,6 @@ impl<'j> Entries<'j> {
                     Entry::Compare => "is it the same as ..?",
                     Entry::About => "about this probe",
                     Entry::SetForce => "set the force",
-                    #[cfg(any(feature = "turns", test))]
                     Entry::TurnOver => "turn it over",
                     Entry::Known(texture) => table.and_then(|t| t.name(texture)).unwrap_or("?"),
                     Entry::Numbered => {

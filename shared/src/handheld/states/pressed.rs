@@ -1,4 +1,4 @@
-//! What time and the button do on each page: a short press goes on, a long one takes.
+//! Effects of time and of the button on each page: a short press moves on, a long one takes.
 
 use super::lists::{Entry, List};
 use super::{Answer, CLICK, Choice, DARK_AFTER, Handheld, Job, LEARNED, NO_WORDS, Page};
@@ -8,7 +8,7 @@ use crate::handheld::screen::Trouble;
 use crate::handheld::spelling::{Spelling, Taken};
 
 impl Handheld<'_> {
-    /// A hundredth of a second, and whether the button is pressed.
+    /// A hundredth of a second, with the level of the button.
     pub fn tick(&mut self, pressed: bool) {
         self.shown = self.shown.saturating_add(1);
         self.idle = self.idle.saturating_add(1);
@@ -36,7 +36,7 @@ impl Handheld<'_> {
         self.fresh = true;
         let asks = self.judgement.as_ref().is_some_and(Judgement::is_changed);
         match (&mut self.page, press) {
-            // nothing to be said while the table is at work
+            // no sound while the table is at work
             (Page::Thinking | Page::Saving, _) => return,
             (Page::Dark, _) => self.begin(),
             (Page::Ready, Press::Short) => self.show(Page::Choose(List::Menu, 0)),
@@ -79,7 +79,7 @@ impl Handheld<'_> {
         self.sound(CLICK);
     }
 
-    /// Does what an entry stands for.
+    /// Carries out an entry.
     fn take(&mut self, list: List, at: u16) {
         match self.entries(list).entry(at) {
             Entry::Compare => self.show(Page::Choose(List::Reference, 0)),
@@ -88,7 +88,6 @@ impl Handheld<'_> {
                 self.job = Some(Job::Calibrate);
                 self.show(Page::Air);
             }
-            #[cfg(any(feature = "turns", test))]
             Entry::TurnOver => {
                 self.job = Some(Job::TurnOver);
                 self.show(Page::Turn(false));

@@ -490,7 +490,7 @@ fn an_exploration_is_kept_until_the_rig_moves_again() {
     feels(&mut probe, &[]);
     assert_eq!(
         command(&mut probe, exploration(false)).unwrap_err(),
-        "the rig does not come to an end: home it"
+        "the movement does not end: home the rig"
     );
     assert!(command(&mut probe, Command::Label(name("oak"))).is_err());
 }

@@ -13,7 +13,6 @@ use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_lab::remote::say::show_found;
 use tactus_link::Request;
 use tactus_study::pictures::exploration::Exploration;
-use tactus_study::pictures::timeline::{Timeline, Watch};
 
 use super::bench::Bench;
 use super::line::Where;
@@ -136,12 +135,11 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     bench.get(Request::command(Command::Stream(true)))?;
     let mut show = Show::new(table, &mut *out);
     let mut slides = Transcript::default();
-    let (mut exploration, mut watch) = (Exploration::new(table), Watch::default());
+    let mut exploration = Exploration::new(table);
     let found = bench.run(Request::identify(wanted), |report| {
         slides.event(&report.event, table);
         if canvas.is_some() {
             exploration.event(&report.event);
-            watch.report(report.at_ms, &report.event);
         }
         show.event(&report.event)
     })?;
@@ -164,8 +162,7 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
         print_json(&identification, stdout)?;
     }
     if let Some(canvas) = canvas {
-        let mut figures = exploration.figures(args.stop.threshold)?;
-        figures.extend(watch.last().map(Timeline::figure).transpose()?);
+        let figures = exploration.figures(args.stop.threshold)?;
         canvas.write("tactus device identify", &figures, stdout)?;
     }
     Ok(match answered.map(|(verdict, _)| verdict.told()) {

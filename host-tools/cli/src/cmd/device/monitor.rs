@@ -3,7 +3,6 @@
 //! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
 //! together.
 
-mod film;
 mod keys;
 mod state;
 mod view;
@@ -19,7 +18,6 @@ use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify, Report};
 use tactus_link::{Job, LinkError, PortError, ReadTable, Request};
 
-pub(super) use self::film::film;
 use self::keys::Act;
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};

@@ -1,4 +1,4 @@
-//! The bench image on the emulated chip: gives it work, and holds what it finds against the plain kernels on this PC.
+//! The bench inside the silicon image on the emulated chip: gives it work, and holds what it finds against the plain kernels on this PC.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use tactus_world::world::Setup;
 
 use super::error::BenchError;
 use super::workload::{self, Counter, Workload};
-use crate::board::cycles::Spent;
+use crate::board::cycles::CycleCount;
 use crate::board::{Emulator, Options};
 
 /// What the chip found.
@@ -26,7 +26,9 @@ pub(super) struct Bench {
     traces: bool,
 }
 
-/// Offsets in the bench image's `Desk`.
+/// What has the silicon image serve the bench.
+const WANTED: u32 = 0x7ac7_be7c;
+/// Offsets in the silicon image's `Desk`.
 const STATE: u64 = 0;
 const WORKLOAD: u64 = 4;
 const INSTRUCTIONS: u64 = 16;
@@ -55,9 +57,11 @@ fn unsuitable(workload: Workload, what: &'static str) -> BenchError {
 }
 
 impl Bench {
-    /// Boots the bench image, to count cycles, too, where it `traces`.
+    /// Boots the silicon image as bench, to count cycles, too, where it `traces`.
     pub(super) fn start(elf: &Path, traces: bool) -> Result<Self, BenchError> {
         let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
+        let (wanted, _) = emulator.symbol("BENCH_WANTED")?;
+        emulator.write(wanted, &WANTED.to_le_bytes())?;
         let (desk, _) = emulator.symbol("BENCH_DESK")?;
         // where the chip says that it counts
         let (counts, _) = emulator.symbol("BENCH_COUNTS")?;
@@ -147,7 +151,7 @@ impl Bench {
         // what the one before has left
         self.emulator.cycle_profile()?;
         let (instructions, results) = self.send(workload, table, words)?;
-        let spent: Spent = self.emulator.cycle_profile()?.total(0..1);
+        let spent: CycleCount = self.emulator.cycle_profile()?.total(0..1);
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);
         workload::run(workload, &self.plan, table, words, &mut Uncounted, &mut put)

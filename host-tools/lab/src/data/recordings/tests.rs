@@ -370,7 +370,7 @@ fn the_writer_refuses_what_the_reader_would() {
     let other = message(other.unwrap_err());
     assert!(other.contains("not whole, by: test"), "{other}");
 
-    // and the same one goes on, once
+    // and the same one continues, once
     let mut writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
     assert!(writer.has(0, 1) && !writer.has(1, 1));
     writer.write(&slide(1, 1)).unwrap();
@@ -514,7 +514,7 @@ fn labels_come_back_and_older_manifests_have_none() {
     };
     let paces = [0, 1].map(|texture| pace(folder.path(), texture));
     assert_eq!(paces, [Some(-341), None]);
-    // what is neither yes nor no is none
+    // a value that is neither yes nor no is unknown
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace(",,no,", ",,maybe,")).unwrap();
