@@ -176,15 +176,6 @@ fn six_textures_are_right_by_an_arm_as_by_our_rig() {
     assert_eq!((arm[0], arm[2]), (6, 0));
 }
 
-#[test]
-#[ignore = "the book's figure; minutes"]
-fn fifty_textures_are_right_by_an_arm_as_by_our_rig() {
-    let [arm, ours] = explored(1..=50);
-    println!("right, undecided, wrong, slides: by an arm {arm:?}, by our rig {ours:?}");
-    assert_eq!(arm[2], 0);
-    assert!(arm[0] >= ours[0].min(49), "{arm:?} {ours:?}");
-}
-
 /// A table of two textures; what is under the finger is `texture`.
 fn bad_arm(texture: u8, seed: u64, how: Misbehaves) -> Ended {
     let world = world(1, texture, 2);

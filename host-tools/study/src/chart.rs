@@ -148,35 +148,6 @@ fn plain(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
-/// Draws curves over the same x as SVG, each with its name.
-///
-/// # Errors
-/// See [`DrawError`].
-pub fn curves(
-    title: &str,
-    x: &str,
-    y: &str,
-    curves: &[(&str, Vec<(f64, f64)>)],
-) -> Result<String, DrawError> {
-    let series = curves.iter().enumerate();
-    let series = series.map(|(n, (name, points))| {
-        Series::curve(
-            n % MARKS.len(),
-            MARKS[n % MARKS.len()],
-            *name,
-            points.clone(),
-        )
-    });
-    let x_range = buffer(
-        curves
-            .iter()
-            .flat_map(|(_, points)| points)
-            .map(|(x, _)| *x),
-    );
-    let chart = Chart::new(title, x, y, x_range, series.collect());
-    Ok(chart.figure("")?.svg)
-}
-
 impl<'a> Chart<'a> {
     /// A chart of the size of a panel whose y axis has room for all points, six marks on the x axis, and a legend.
     pub(crate) fn new(

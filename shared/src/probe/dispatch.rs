@@ -206,7 +206,7 @@ where
                 Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
             Command::WriteCalibration(bytes) => {
-                if !matches!(bytes.len(), 60 | RigCalibration::BYTES) {
+                if bytes.len() != RigCalibration::BYTES {
                     return Err(Failure::CalibrationLength);
                 }
                 let calibration = RigCalibration::from_bytes(bytes)?;

@@ -62,9 +62,6 @@ where
             }
             ExplorationStep::Early(ms) => tell(Event::Early(ms)),
             ExplorationStep::Measured(action, measurement, posterior) => {
-                if let Some(pace) = measurement.pace {
-                    tell(Event::Pace(pace));
-                }
                 tell(Event::SlideReport {
                     slide,
                     action,

@@ -17,8 +17,7 @@ pub struct RigCalibration {
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
     /// Day on which the force per count was measured, as 20261121; [`RigCalibration::UNDATED`] if the day is unknown,
-    /// 0 if it was not measured. Programs before version 7 of the messages dated every calibration: see
-    /// [`RigCalibration::scale_day`].
+    /// 0 if it was not measured.
     pub date: u32,
     /// True if P_DC in the air was measured with this finger and is no default.
     pub air_known: bool,
@@ -33,15 +32,12 @@ impl RigCalibration {
     /// The date of a calibration that a probe made without a computer: it has no clock.
     pub const UNDATED: u32 = 1;
 
-    /// Marks a stored date whose rule about P_DC in the air is inverted: the plain rule, from programs before version
-    /// 7, is that it is known if there is a date.
-    const OTHER_AIR: u32 = 1 << 31;
+    /// The bit of the stored date that says that P_DC in the air is known.
+    const AIR_KNOWN: u32 = 1 << 31;
 
-    /// Day on which the force per count was measured, see [`RigCalibration::date`]. `None` for the paper's own value,
-    /// whatever the date is.
+    /// Returns the day on which the force per count was measured, see [`RigCalibration::date`]; `None` if it was not.
     pub fn scale_day(&self) -> Option<u32> {
-        let is_papers = self.pressure.force_mn_per_count == Calibration::PAPER.force_mn_per_count;
-        (self.date != 0 && !is_papers).then_some(self.date)
+        (self.date != 0).then_some(self.date)
     }
 
     /// The calibration with a measured P_DC in the air, counts.
@@ -58,77 +54,66 @@ impl RigCalibration {
         (current_a - standstill - per_mm_s * speed_mm_s) * self.newton_per_ampere
     }
 
-    /// Most bytes of a stored record.
+    /// Bytes of a stored record.
     pub const BYTES: usize = 64;
 
-    /// The record as it is stored: nine f32, the date, the serial number, the day on which the accelerometer was turned
-    /// over, if it was, and a CRC-32 of these; little-endian. The highest bit of the date inverts the rule that P_DC in
-    /// the air is known if there is a date.
+    /// Returns the record as it is stored: nine f32, the date, the day on which the accelerometer was turned over, the serial
+    /// number, and a CRC-32 of these; little-endian. The highest bit of the date is set where P_DC in the air is known.
     #[inline(never)]
     pub fn to_bytes(&self) -> Vec<u8, { Self::BYTES }> {
+        let air = if self.air_known { Self::AIR_KNOWN } else { 0 };
         let numbers = self.numbers().into_iter().flat_map(f32::to_le_bytes);
-        let other_air = self.air_known != (self.date != 0);
-        let date = self.date | if other_air { Self::OTHER_AIR } else { 0 };
-        let fields = numbers.chain(date.to_le_bytes()).chain(self.serial);
+        let days = [self.date | air, self.turned].into_iter();
+        let fields = numbers.chain(days.flat_map(u32::to_le_bytes));
         let mut bytes = Vec::new();
         // there is room for all of them
-        for byte in fields {
+        for byte in fields.chain(self.serial) {
             let _ = bytes.push(byte);
-        }
-        if self.turned != 0 {
-            let _ = bytes.extend_from_slice(&self.turned.to_le_bytes());
         }
         let _ = bytes.extend_from_slice(&CRC32.checksum(&bytes).to_le_bytes());
         bytes
     }
 
-    /// The record in `bytes`, checked.
+    /// Returns the record in `bytes`, checked.
     ///
     /// # Errors
     /// [`RigCalibrationError::Damaged`], or the error of [`RigCalibration::check`].
     #[inline]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RigCalibrationError> {
-        let (body, crc) = bytes
-            .split_last_chunk::<4>()
-            .ok_or(RigCalibrationError::Damaged)?;
-        if CRC32.checksum(body) != u32::from_le_bytes(*crc) {
+        let whole: &[u8; Self::BYTES] =
+            bytes.try_into().map_err(|_| RigCalibrationError::Damaged)?;
+        let (words, _) = whole.as_chunks::<4>();
+        let (body, crc) = whole.split_at(Self::BYTES - 4);
+        if crc != CRC32.checksum(body).to_le_bytes() {
             return Err(RigCalibrationError::Damaged);
         }
-        let (numbers, rest) = body
-            .split_first_chunk::<{ 10 * 4 }>()
-            .ok_or(RigCalibrationError::Damaged)?;
-        let (serial, turned) = rest
-            .split_first_chunk::<16>()
-            .ok_or(RigCalibrationError::Damaged)?;
-        let turned = match turned {
-            [] => 0,
-            day => u32::from_le_bytes(day.try_into().map_err(|_| RigCalibrationError::Damaged)?),
+        let mut words = words.iter().copied();
+        let mut word = || words.next().unwrap_or_default();
+        let mut number = || f32::from_le_bytes(word());
+        let pressure = Calibration {
+            pac_pa_per_count: number(),
+            pac_rest: number(),
+            pdc_pa_per_count: number(),
+            pdc_no_contact: number(),
+            force_mn_per_count: number(),
+            linear_mn: number(),
         };
-        let mut words = numbers.as_chunks::<4>().0.iter();
-        let mut number = || {
-            words
-                .next()
-                .map_or(f32::NAN, |word| f32::from_le_bytes(*word))
-        };
-        let mut record = Self {
-            pressure: Calibration {
-                pac_pa_per_count: number(),
-                pac_rest: number(),
-                pdc_pa_per_count: number(),
-                pdc_no_contact: number(),
-                force_mn_per_count: number(),
-                linear_mn: number(),
-            },
-            unloaded_a: (number(), number()),
-            newton_per_ampere: number(),
-            date: words.next().map_or(0, |word| u32::from_le_bytes(*word)),
-            air_known: false,
+        let unloaded_a = (number(), number());
+        let newton_per_ampere = number();
+        let [date, turned] = [word(), word()].map(u32::from_le_bytes);
+        let mut serial = [0; 16];
+        for (to, from) in serial.iter_mut().zip(words.flatten()) {
+            *to = from;
+        }
+        let record = Self {
+            pressure,
+            unloaded_a,
+            newton_per_ampere,
+            date: date & !Self::AIR_KNOWN,
+            air_known: date & Self::AIR_KNOWN != 0,
             turned,
-            serial: *serial,
+            serial,
         };
-        let other_air = record.date & Self::OTHER_AIR != 0;
-        record.date &= !Self::OTHER_AIR;
-        record.air_known = other_air != (record.date != 0);
         record.check()?;
         Ok(record)
     }
@@ -192,7 +177,7 @@ pub enum RigCalibrationError {
     /// The points do not lie on a line: R^2 below 0.99.
     #[error("the points do not lie on a line (R^2 below 0.99): measure again")]
     NoLine,
-    /// The value of an accelerometer's count. New in version 10.
+    /// The value of an accelerometer's count.
     #[error("an accelerometer's count is within a tenth of 0.976 mg: turn the finger over again")]
     Turned,
 }
@@ -332,9 +317,6 @@ mod tests {
             turned: 20_261_126,
             ..rig
         };
-        // that of before version 10, but for an accelerometer that was turned over
-        assert_eq!(rig.to_bytes().len(), 60);
-        assert_eq!(turned.to_bytes().len(), RigCalibration::BYTES);
         assert_eq!(RigCalibration::from_bytes(&turned.to_bytes()), Ok(turned));
         for whole in [rig.to_bytes(), turned.to_bytes()] {
             for bit in 0..8 * whole.len() {
@@ -377,18 +359,8 @@ mod tests {
             RigCalibration::from_bytes(&nonsense),
             Err(RigCalibrationError::Current)
         );
-        // dated by a program that did not ask for a scale
-        assert_eq!(rig.scale_day(), None);
-        let weighed = Calibration {
-            force_mn_per_count: 11.4,
-            ..Calibration::PAPER
-        };
-        let weighed = RigCalibration {
-            pressure: weighed,
-            ..rig
-        };
-        assert_eq!(weighed.scale_day(), Some(20_261_121));
-        assert_eq!(RigCalibration { date: 0, ..weighed }.scale_day(), None);
+        assert_eq!(rig.scale_day(), Some(20_261_121));
+        assert_eq!(RigCalibration { date: 0, ..rig }.scale_day(), None);
         let pressure = Calibration {
             force_mn_per_count: -1.0,
             ..Calibration::PAPER

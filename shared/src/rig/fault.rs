@@ -137,15 +137,15 @@ faults! {
          rises, or no contact 1 mm below that of the last press on this sample", 2, BOTH, ALL,
         "look whether the finger is up, and turn the lever's knob until it is; check the fingertip and the sensor's \
          P_DC, then reset";
-    /// The arm that moves the finger sends no reports any more. New in version 11.
+    /// The arm that moves the finger sends no reports any more.
     ArmSilent, "arm silent", "no report of the arm about its open order for 0.5 s", 502, ARM, ALL,
         "look whether the finger is up, and move the arm away by its own controls; check that its program runs, then \
          reset";
-    /// The arm does not stop when ordered to. New in version 11.
+    /// The arm does not stop when ordered to.
     ArmRuns, "arm does not stop",
         "the force is still over the limit 0.2 s after a stop, or the finger still presses after 2 s", 202, ARM, ALL,
         "press the arm's own emergency stop, and move it away by its controls; then reset";
-    /// The arm did something other than its order. New in version 11.
+    /// The arm did something other than its order.
     ArmOff, "arm off its order",
         "the arm reports a press and P_DC is more than 2 counts and 10 % off the force; it reports a lifted finger and \
          P_DC disagrees; its slide was 5 % shorter, longer, slower or faster than ordered, by its report or by the \

@@ -128,12 +128,9 @@ impl Chosen {
     }
 }
 
-/// Bytes of constants of a finger that was not turned over ([`RigCalibration::to_bytes`]).
-const CALIBRATION_BYTES: usize = 60;
-
 fn read(file: &Path) -> Option<FirmwareData> {
     let bytes = std::fs::read(file).ok()?;
-    let (calibration, table) = bytes.split_at_checked(CALIBRATION_BYTES)?;
+    let (calibration, table) = bytes.split_at_checked(RigCalibration::BYTES)?;
     Table::read(table).ok()?;
     Some(FirmwareData {
         calibration: RigCalibration::from_bytes(calibration).ok()?,

@@ -17,8 +17,8 @@ use tactus_world::person::Manner;
 
 use crate::changed_cuts::reboot;
 use crate::common::{boot, elf, elf_of};
+use crate::damaged_store::troubles;
 use crate::handheld_link::Held;
-use crate::old_store::troubles;
 
 /// The texture under the finger, which the tables have.
 const TEXTURE: u8 = 47;

@@ -6,6 +6,7 @@ use tactus_core::features::MovementError;
 use tactus_core::sensor::pressure::RATE_HZ;
 
 use crate::data::recordings::npy::{MAX_SAMPLES, NpyError};
+use crate::data::recordings::own::VERSION;
 
 /// A fault in the contents of a file, and its remedy. The errors that hold it name the file, and the place in it.
 #[derive(Debug, thiserror::Error)]
@@ -74,6 +75,12 @@ pub enum ContentError {
     Count(u16),
 
     // recorded slides
+    /// They are of another version of the format.
+    #[error(
+        "version {0}, and this program reads version {VERSION}: write the recordings anew, or use the program \
+         that wrote them"
+    )]
+    Version(u32),
     /// Start and end of the steady part, s.
     #[error("the steady window {0} s to {1} s is not a stretch of time")]
     Window(f32, f32),

@@ -44,8 +44,6 @@ struct Begun {
     forces: Vec<(u32, i16)>,
     /// P_DC from the slide's begin on, counts about that of the lifted finger, if the probe sends it
     pdc: Vec<i16>,
-    /// its speed, if the probe sends it
-    pace: Option<i16>,
     /// it ended before its end
     early: bool,
 }
@@ -110,21 +108,25 @@ impl Recorder {
                 slide.blocks.push(block.clone());
             }
             Event::Pdc(counts) => slide.pdc.extend_from_slice(counts),
-            Event::Pace(pace) => slide.pace = Some(*pace),
             Event::Early(_) => slide.early = true,
-            Event::SlideReport { .. } => {
+            Event::SlideReport { observed, .. } => {
                 let slide = std::mem::take(slide);
                 if slide.early {
                     return None;
                 }
-                return Some(self.finish(texture, slide));
+                return Some(self.finish(texture, slide, observed.pace));
             }
             _ => {}
         }
         None
     }
 
-    fn finish(&mut self, texture: usize, slide: Begun) -> Result<Recording, RecordError> {
+    fn finish(
+        &mut self,
+        texture: usize,
+        slide: Begun,
+        pace: Option<i16>,
+    ) -> Result<Recording, RecordError> {
         let mut numbered = slide.blocks.iter().enumerate();
         if let Some((missing, _)) = numbered.find(|(n, block)| usize::from(block.number) != *n) {
             return Err(RecordError::MissingBlock(missing as u16));
@@ -151,7 +153,7 @@ impl Recorder {
         Ok(Recording {
             texture,
             number: self.numbers,
-            pace: slide.pace,
+            pace,
             ..recording
         })
     }

@@ -140,7 +140,6 @@ fn measure_each<T: Send>(
 pub struct Replay {
     /// Those that were not replayed yet.
     slides: Vec<Recording>,
-    last: Option<Recording>,
     /// The movements that were recorded.
     movements: Vec<Movement>,
     measures: PropertySet,
@@ -174,15 +173,9 @@ impl Replay {
                 .filter(|&p| traction || p != Property::Traction)
                 .collect(),
             slides,
-            last: None,
             movements,
             random,
         }
-    }
-
-    /// The slide that was replayed last.
-    pub fn last(&self) -> Option<&Recording> {
-        self.last.as_ref()
     }
 }
 
@@ -208,7 +201,7 @@ impl Rig for Replay {
             });
         }
         let drawn = recorded[self.random.random_range(0..recorded.len())];
-        self.last.insert(self.slides.remove(drawn)).play(slide);
+        self.slides.remove(drawn).play(slide);
         Ok(())
     }
 

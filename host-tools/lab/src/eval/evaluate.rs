@@ -10,7 +10,7 @@ use tactus_core::explorer::{
 };
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
-use tactus_core::table::{Action, MAX_MOVEMENTS, Table, TableError};
+use tactus_core::table::{Action, Table, TableError};
 
 use crate::eval::experiment::{Experiment, Run};
 use crate::eval::learn;
@@ -85,8 +85,6 @@ pub struct Outcome {
     pub told: Told,
     /// Slides made.
     pub slides: u8,
-    /// Number of them with each movement.
-    pub made: [u8; MAX_MOVEMENTS],
     /// True if it would have been called unknown, had that been an answer.
     pub unknown_like: bool,
 }
@@ -158,24 +156,11 @@ pub fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
-    run: Run<'_>,
-    each: impl FnMut(Action, &Explorer<'_, N>),
-) -> Outcome {
-    play_looking(explorer, confusions, strategy, run, |_, _, _, _| (), each)
-}
-
-/// As [`play_with`]; `look` gets every action with the number of its slide before that is observed.
-pub(super) fn play_looking<const N: usize>(
-    explorer: &mut Explorer<'_, N>,
-    confusions: Option<&Confusions<Vec<Degrees>>>,
-    strategy: Strategy,
     mut run: Run<'_>,
-    mut look: impl FnMut(&mut Explorer<'_, N>, &Run<'_>, Action, usize),
     mut each: impl FnMut(Action, &Explorer<'_, N>),
 ) -> Outcome {
     explorer.restart();
     let mut failed = 0;
-    let mut made = [0; MAX_MOVEMENTS];
     let verdict = loop {
         if let Some(verdict) = explorer.verdict() {
             break verdict;
@@ -191,8 +176,7 @@ pub(super) fn play_looking<const N: usize>(
             _ => Default::default(),
         };
         let action = explorer.choose(&expected, run.random.next_u32());
-        let movement = action.movement.into();
-        let Some(n) = run.draw(movement) else {
+        let Some(slide) = run.slide(action.movement.into()) else {
             // as the core explores on a rig: once more, then another movement, and then it ends with the present
             // posterior
             failed += 1;
@@ -202,10 +186,8 @@ pub(super) fn play_looking<const N: usize>(
             continue;
         };
         failed = 0;
-        made[usize::from(action.movement)] += 1;
-        look(explorer, &run, action, n);
         explorer
-            .observe(action, run.shown(movement, n))
+            .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
         each(action, explorer);
     };
@@ -215,7 +197,6 @@ pub(super) fn play_looking<const N: usize>(
         sure: verdict.sure,
         told: verdict.told(),
         slides: explorer.slides(),
-        made,
         unknown_like: explorer.is_unknown(),
     }
 }
@@ -249,18 +230,6 @@ pub(super) fn evaluate_by<T: Send>(
     play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
 ) -> Result<Vec<T>, EvaluateError> {
     let learn = |run| experiment.run(run).learn(config.method);
-    evaluate_from(experiment, config, runs, done, learn, play)
-}
-
-/// As [`evaluate_by`], with tables that `learn` makes from the training slides of a run.
-pub(super) fn evaluate_from<T: Send>(
-    experiment: &Experiment,
-    config: Config,
-    runs: u64,
-    done: impl Fn() + Sync,
-    learn: impl Fn(u64) -> Result<Vec<u8>, learn::TableError> + Sync,
-    play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
-) -> Result<Vec<T>, EvaluateError> {
     let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, kept: Kept<'_>, index| {
         let outcome = play(explorer, kept, experiment.run(index));
         done();
@@ -478,7 +447,6 @@ mod tests {
             sure,
             told: if sure { Told::Sure } else { Told::Undecided },
             slides,
-            made: [0; MAX_MOVEMENTS],
             unknown_like: slides == 4,
         };
         let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];

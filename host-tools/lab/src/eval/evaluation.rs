@@ -6,7 +6,7 @@ use tactus_core::explorer::Config;
 use crate::eval::courses::courses;
 use crate::eval::evaluate::{EvaluateError, Method, Outcome, Summary, evaluate};
 use crate::eval::experiment::Experiment;
-use crate::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
+use crate::eval::reliability::{Statements, statements};
 use crate::eval::verdicts::Verdicts;
 
 pub use crate::eval::courses::Course;
@@ -36,8 +36,6 @@ pub struct Evaluation {
     pub mean_slides_told: f64,
     /// Reliability of the probabilities: share of right names by the stated probability.
     pub reliability: Vec<Statements>,
-    /// The figures at other thresholds.
-    pub by_threshold: Vec<AtThreshold>,
     /// Figures of explorations whose texture is one of the table's for certain, with slides drawn with replacement: the
     /// paper's protocol.
     #[serde(flatten)]
@@ -57,7 +55,7 @@ pub struct EvaluationRequest {
     pub seed: u64,
     /// Ends and choices of the runs.
     pub config: Config,
-    /// True if reliability and other thresholds are wanted: a third of the work.
+    /// True if reliability is wanted: a third of the work.
     pub with_courses: bool,
 }
 
@@ -103,7 +101,6 @@ pub fn evaluation(
     let names = experiment.names();
     let evaluation = Evaluation {
         reliability: statements(&all, config.threshold),
-        by_threshold: by_threshold(&all, config.threshold),
         method,
         protocol: request.protocol,
         train_slides: experiment.train_slides(),

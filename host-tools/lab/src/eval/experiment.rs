@@ -505,26 +505,12 @@ impl<'e> Run<'e> {
     /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.
     pub fn slide(&mut self, movement: usize) -> Option<&'e Observation> {
         let n = self.draw(movement)?;
-        Some(self.shown(movement, n))
-    }
-
-    /// The slide of the unknown texture of which the number was drawn.
-    pub(super) fn shown(&self, movement: usize, n: usize) -> &'e Observation {
-        self.drawn(self.experiment, movement, n)
-    }
-
-    /// A slide of the unknown texture in an experiment with the same slides, by the number that was drawn.
-    pub(super) fn drawn<'o>(
-        &self,
-        of: &'o Experiment,
-        movement: usize,
-        n: usize,
-    ) -> &'o Observation {
+        let of = self.experiment;
         let pool = &of.pools[self.unknown][movement];
-        match &pool.test {
+        Some(match &pool.test {
             Some(test) => &test[n],
             None => &pool.train[self.place(movement, pool, of.train_slides + n)],
-        }
+        })
     }
 
     /// The number of one more slide.

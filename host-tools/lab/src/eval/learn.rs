@@ -94,7 +94,7 @@ pub fn learn(
 /// Expectations of a fused table.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Expected {
-    /// Change of fingers and samples; `None` for a table as version 3 had it, without limits.
+    /// Change of fingers and samples; `None` for a table without drift and limits, which decides by its means alone.
     pub drift: Option<Drift>,
     /// Share of known textures that may be taken for new ones.
     pub false_alarm: f32,

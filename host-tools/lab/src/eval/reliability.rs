@@ -1,4 +1,4 @@
-//! Reliability of stated probabilities, and the effect of another threshold.
+//! Reliability of stated probabilities.
 
 use serde::Serialize;
 
@@ -7,9 +7,6 @@ use super::verdicts::Verdicts;
 
 /// Lower ends of the probabilities that are counted together; the last has no upper one.
 const SAID: [f32; 7] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999];
-/// Thresholds that are compared, besides the one in use.
-const THRESHOLDS: [f32; 8] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
-
 /// Statements of about the same probability: the most probable texture after each slide, until the exploration ended.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Statements {
@@ -23,17 +20,6 @@ pub struct Statements {
     pub right: u64,
     /// Mean of the stated probabilities; `None` if there are none.
     pub said: Option<f64>,
-}
-
-/// The result of explorations at a threshold.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct AtThreshold {
-    /// Sure above this probability.
-    pub threshold: f32,
-    /// Mean number of slides until the answer.
-    pub mean_slides: f64,
-    /// Shares of the verdicts.
-    pub verdicts: Verdicts,
 }
 
 /// Share of right names by the stated probability of the most probable texture. Slides of one exploration are not
@@ -69,24 +55,6 @@ pub fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
         ..bin
     };
     bins.into_iter().map(mean).collect()
-}
-
-/// The results of explorations at usual thresholds and at the one in use, from the lowest on.
-pub fn by_threshold(courses: &[Course], in_use: f32) -> Vec<AtThreshold> {
-    let mut thresholds = THRESHOLDS.to_vec();
-    if !thresholds.contains(&in_use) {
-        thresholds.push(in_use);
-        thresholds.sort_by(f32::total_cmp);
-    }
-    let at = |threshold| {
-        let slides = courses.iter().map(|course| course.told(threshold).1 as f64);
-        AtThreshold {
-            threshold,
-            mean_slides: slides.sum::<f64>() / courses.len().max(1) as f64,
-            verdicts: verdicts(courses, threshold),
-        }
-    };
-    thresholds.into_iter().map(at).collect()
 }
 
 /// Shares of the verdicts at this threshold.

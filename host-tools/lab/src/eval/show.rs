@@ -153,15 +153,17 @@ impl<'t, W: Write> Show<'t, W> {
                 observed,
                 posterior,
                 ..
-            } => self.slide_report(
-                *action,
-                &observed.properties(),
-                observed.roughness_is_bound,
-                posterior,
-            ),
-            Event::Pace(pace) => {
-                let percent = 100.0 * (f64::from(*pace) / 1024.0).exp();
-                self.line(&format!("  speed: {percent:.0} % of the movement's"))
+            } => {
+                if let Some(pace) = observed.pace {
+                    let percent = 100.0 * (f64::from(pace) / 1024.0).exp();
+                    self.line(&format!("  speed: {percent:.0} % of the movement's"))?;
+                }
+                self.slide_report(
+                    *action,
+                    &observed.properties(),
+                    observed.roughness_is_bound,
+                    posterior,
+                )
             }
             Event::Early(ms) => self.early(*ms),
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
@@ -387,7 +389,7 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{features}: {}", set.name())?;
         let share = |share: f32| format!("{:.1} %", 100.0 * share);
         match table.drift() {
-            None => writeln!(out, "no drift and no limits: of an older version")?,
+            None => writeln!(out, "it has neither drift nor limits")?,
             Some(drift) if drift.is_none() => writeln!(out, "no drift is expected")?,
             Some(drift) => writeln!(
                 out,

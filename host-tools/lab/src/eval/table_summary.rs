@@ -21,7 +21,7 @@ pub struct TableSummary {
     /// Day on which that finger's force per count was measured, as 20261121; 1 if the day is unknown, 0 if it was not
     /// measured or that is unknown.
     pub finger_calibrated: u32,
-    /// The drift that it expects; `null` in a table of properties or of an older version.
+    /// The drift that it expects; `null` in a table of properties.
     pub drift: Option<Drift>,
     /// The share of false alarms that its limits are for; `null` where it has none.
     pub false_alarm: Option<f32>,

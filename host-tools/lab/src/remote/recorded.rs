@@ -47,8 +47,8 @@ pub(super) struct RecordedSlide {
     pub(super) pdc: Stream,
     /// Tangential force, mN; empty where it was not measured.
     pub(super) shear_mn: Stream,
-    /// What the slide says, and its pace; else why it says nothing.
-    pub(super) measured: std::result::Result<(SlideReport, Option<i16>), String>,
+    /// The features of the slide, or the reason why it has none.
+    pub(super) measured: std::result::Result<SlideReport, String>,
 }
 
 /// Samples, so many a second.
@@ -323,7 +323,7 @@ impl RecordedSlide {
         let still = pac.len();
         pac.extend(moving);
         let measured = measure(plan, slide)
-            .map(|measured| (SlideReport::from(&measured), measured.pace))
+            .map(|measured| SlideReport::from(&measured))
             .map_err(|why| why.to_string());
         Self {
             texture: slide.texture,
@@ -344,15 +344,11 @@ impl RecordedSlide {
     }
 
     fn observation(&self) -> Option<Observation> {
-        let (report, pace) = self.measured.as_ref().ok()?;
-        Some(Observation {
-            pace: *pace,
-            ..report.observation()
-        })
+        Some(self.measured.as_ref().ok()?.observation())
     }
 
     fn has_traction(&self) -> bool {
         let report = self.measured.as_ref();
-        report.is_ok_and(|(report, _)| report.properties[0].is_some())
+        report.is_ok_and(|report| report.properties[0].is_some())
     }
 }

@@ -262,8 +262,8 @@ pub fn learn_with(
 mod tests {
     use super::*;
     use crate::sim::collection::texture_number;
-    use tactus_core::handheld::{ASK_AFTER, MAX_SLIDES, judge_at_most};
-    use tactus_core::table::{Table, factory};
+    use tactus_core::handheld::{ASK_AFTER, judge_at_most};
+    use tactus_core::table::Table;
 
     fn world(among: u8) -> Collection {
         Collection {
@@ -381,125 +381,6 @@ mod tests {
             person.intend(0.5, 8.0);
             let over = person.run_until(&mut touch, 2.0, |_| true);
             assert_eq!(over, Some(Event::Again(Again::TooUneven)), "{trial}");
-        }
-    }
-
-    #[test]
-    #[ignore = "the book's figures; a minute"]
-    fn all_textures_of_the_world() {
-        let collection = Collection {
-            textures: (1..=117).collect(),
-            // as the factory's table
-            trials: 15,
-            ..world(1)
-        };
-        let measured: Vec<_> = collection
-            .textures
-            .par_iter()
-            .map(|&t| (t, slides(collection.setup(t, 0), Manner::default(), 5)))
-            .collect();
-        let bad: u32 = measured
-            .iter()
-            .filter_map(|(_, r)| r.as_ref().ok())
-            .map(|r| r.1)
-            .sum();
-        eprintln!("{bad} slides rejected");
-        let (table, left_out) = learn_with(FingerName::Biotac, &collection, || ()).unwrap();
-        eprintln!("no good slide: {left_out:?}; {} bytes", table.len());
-        explore(&collection, &table);
-        // none of another world's textures is known
-        let other = Collection {
-            seed: 2,
-            ..collection
-        };
-        let read = Table::read(&table).unwrap();
-        let [mut all, mut new, mut taken] = [0; 3];
-        for &texture in &other.textures {
-            let Ok((measured, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
-                continue;
-            };
-            let mut judged = (1..=ASK_AFTER).map(|n| {
-                judge_at_most(read, &measured[..n], None, None, ASK_AFTER)
-                    .unwrap()
-                    .0
-            });
-            let judged = judged.find(|judged| !judged.open).unwrap();
-            all += 1;
-            new += usize::from(judged.unknown);
-            taken += usize::from(judged.sure);
-        }
-        let unsure = all - new - taken;
-        eprintln!("{all} of another world: unknown {new}, unsure {unsure}, taken for one {taken}");
-    }
-
-    /// Slides of a touch in [`what_more_slides_tell`].
-    const MOST: usize = 12;
-
-    /// Explores touches that the factory's table of a finger was not learned from: their number, and after 1 to
-    /// [`MOST`] slides the numbers of those that are sure and right, sure and wrong, and unknown.
-    fn explore_factory(
-        finger: FingerName,
-        trials: std::ops::Range<u64>,
-    ) -> (usize, Vec<[usize; 3]>) {
-        let table = Table::read(factory::handheld(finger)).unwrap();
-        let world = world(117);
-        let touches: Vec<_> = (1..=117)
-            .filter_map(|texture| Some((texture, table.find(texture_name(texture))?)))
-            .flat_map(|known| trials.clone().map(move |trial| (known, trial)))
-            .collect();
-        let ended: Vec<_> = touches
-            .par_iter()
-            .filter_map(|&((texture, is), trial)| {
-                let setup = world.setup_with(finger, texture, trial);
-                // nearly too smooth to be noticed
-                let (measured, _) = slides(setup, Manner::default(), MOST as u32).ok()?;
-                let mut judged = (1..=MOST).map(|n| {
-                    let judged = judge_at_most(table, &measured[..n], None, None, MOST);
-                    (n, judged.unwrap().0)
-                });
-                let (n, last) = judged.find(|(_, judged)| !judged.open).unwrap();
-                Some((n, last.leading[0].0 == is, last))
-            })
-            .collect();
-        let counts = (1..=MOST).map(|most| {
-            let mut counts = [0; 3];
-            for (_, right, last) in ended.iter().filter(|(n, ..)| *n <= most) {
-                let outcome = match (last.unknown, last.sure, right) {
-                    (true, ..) => 2,
-                    (_, true, true) => 0,
-                    (_, true, false) => 1,
-                    _ => continue,
-                };
-                counts[outcome] += 1;
-            }
-            counts
-        });
-        (ended.len(), counts.collect())
-    }
-
-    #[test]
-    #[ignore = "the book's figures; minutes"]
-    fn what_more_slides_tell() {
-        for finger in FingerName::ALL {
-            let (all, counts) = explore_factory(finger, 100..102);
-            for ([right, wrong, unknown], n) in counts.iter().zip(1..) {
-                println!(
-                    "{finger}, at most {n}: right {right}, wrong {wrong}, unknown {unknown} of {all}"
-                );
-            }
-            let after = |slides: usize| counts[slides - 1];
-            let [asked, last, more] = [ASK_AFTER, MAX_SLIDES, MOST].map(after);
-            // of a hundred: five more slides identify five more, and none of them wrong
-            assert!(
-                100 * (last[0] - asked[0]) >= 5 * all,
-                "{finger}: {counts:?}"
-            );
-            assert!(
-                last[1] <= asked[1] + all / 100 && last[1] <= 2,
-                "{finger}: {counts:?}"
-            );
-            // and further slides identify two more at most
-            assert!(100 * (more[0] - last[0]) <= 2 * all, "{finger}: {counts:?}");
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
-use tactus_core::probe::{RigState, Watch};
+use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
@@ -17,7 +17,6 @@ use tactus_core::rig::{Ended, Enough, Fault, MAX_REJECTED, Phase, Refused, Rig, 
 use tactus_core::sensor::biotac;
 use tactus_core::sensor::pressure::{Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::sensor::slot::Unexpected;
-use tactus_core::wire::Event;
 
 use crate::data::recording::Recording;
 use tactus_world::conditions::Conditions;
@@ -82,11 +81,7 @@ pub struct SimRig {
     /// P_DC words of the last tick.
     pdc: Vec<u16>,
     performed: Vec<Performed>,
-    listener: Option<(Watch, Listener)>,
 }
-
-/// Gets the reports of a probe with this rig about a slide, with the time in ms.
-pub type Listener = Box<dyn FnMut(u32, Event) + Send>;
 
 /// The ground truth of a slide, which the control does not know.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -148,23 +143,12 @@ impl SimRig {
             current_a: 0.0,
             pdc: Vec::new(),
             performed: Vec::new(),
-            listener: None,
         }
-    }
-
-    /// Calls `listener` for every slide from now on: with its phases, the state of the rig, and the samples.
-    pub fn listen(&mut self, listener: Listener) {
-        self.listener = Some((Watch::default(), listener));
     }
 
     /// The ground truth of every slide so far.
     pub fn performed(&self) -> &[Performed] {
         &self.performed
-    }
-
-    /// Takes the ground truth of every slide since the last call.
-    pub fn take_performed(&mut self) -> Vec<Performed> {
-        std::mem::take(&mut self.performed)
     }
 
     /// Sensor slots since power-up.
@@ -408,13 +392,6 @@ impl SimRig {
             if each(&self.outputs, &self.pdc) {
                 self.control.end_slide();
             }
-            let now_ms = self.now_ns / TICK_NS;
-            if now_ms.is_multiple_of(Watch::EVERY_MS) && self.listener.is_some() {
-                let state = self.state(None);
-                if let Some((watch, listener)) = &mut self.listener {
-                    watch.look(&state, |event| listener(now_ms as u32, event));
-                }
-            }
             let now = self.world.truth();
             truth.force_max_n = now.force_max_n;
             match &self.outputs.sample_phase {
@@ -520,28 +497,20 @@ impl Rig for SimRig {
             self.home()?;
         }
         let start = self.random.random();
-        let (mut blocks, mut taken) = (Blocks::default(), Vec::new());
-        let listens = self.listener.is_some();
+        let mut blocks = Blocks::default();
         let mut over = false;
         let ended = self.slide_until(slide.movement(), start, |outputs, _| {
             let (phase, pac) = (&outputs.sample_phase, &outputs.pac);
             let Some(block) = blocks.put(phase, pac, outputs.shear_mn) else {
                 return false;
             };
-            let goes_on = !over;
-            if goes_on {
-                slide.take(&block);
-                over = !block.still && enough(slide);
+            if over {
+                return false;
             }
-            taken.extend(listens.then_some(block));
-            goes_on && over
+            slide.take(&block);
+            over = !block.still && enough(slide);
+            over
         })?;
-        if let Some((_, listener)) = &mut self.listener {
-            let now_ms = (self.now_ns / TICK_NS) as u32;
-            for block in taken {
-                listener(now_ms, Event::Block(block));
-            }
-        }
         let lost = match ended {
             Ended::Gap(samples) => samples,
             _ => 0,

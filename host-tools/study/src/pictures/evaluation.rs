@@ -1,14 +1,13 @@
-//! Pictures of `tactus evaluate`: the verdicts on each texture, the reliability of the probabilities, and the effect of
-//! another threshold.
+//! Pictures of `tactus evaluate`: the verdicts on each texture, and the reliability of the probabilities.
 
 use tactus_core::explorer::Told;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
 use tactus_lab::eval::courses::Course;
-use tactus_lab::eval::reliability::{self, Statements, statements, verdicts};
+use tactus_lab::eval::reliability::{Statements, statements, verdicts};
 
-/// The three pictures of these explorations, among textures of these names, at this threshold.
+/// The two pictures of these explorations, among textures of these names, at this threshold.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -17,12 +16,10 @@ pub fn figures(
     names: &[String],
     threshold: f32,
 ) -> Result<Vec<Figure>, DrawError> {
-    let mut figures = vec![
+    Ok(vec![
         confusion(courses, names, threshold)?,
         reliability(courses, threshold)?,
-    ];
-    figures.extend(by_threshold(courses, threshold)?);
-    Ok(figures)
+    ])
 }
 
 /// More names than this are written as numbers below the columns, and no share is written into a cell.
@@ -183,81 +180,4 @@ fn range(bin: &Statements) -> String {
         (low, 100.0) => format!("\u{2265}{low}"),
         (low, high) => format!("{low}\u{2013}{high}"),
     }
-}
-
-/// Slides, and verdicts, by the threshold.
-fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawError> {
-    let by_threshold = reliability::by_threshold(courses, threshold);
-    let thresholds: Vec<f32> = by_threshold.iter().map(|at| at.threshold).collect();
-    let at = thresholds.iter().position(|&t| t == threshold);
-    let at = at.unwrap_or(0) as f64 + 1.0;
-    let text = |x: f64| {
-        let at = (x.round() as usize).wrapping_sub(1);
-        thresholds
-            .get(at)
-            .map_or_else(String::new, |&t| percent(t).to_string())
-    };
-    let x_range = (0.5, thresholds.len() as f64 + 0.5);
-    let x = "threshold: sure above this probability (%)";
-    let mut slides = Series::curve(0, MARKS[0], "", Vec::new());
-    let mut told = [
-        ("told a wrong name as sure", 1),
-        ("told none of those known", 2),
-        ("told a changed one", 3),
-        ("undecided", 0),
-    ]
-    .map(|(name, colour)| Series::curve(colour, MARKS[colour], name, Vec::new()));
-    for (at, n) in by_threshold.iter().zip(1..) {
-        let n = f64::from(n);
-        let (mean, v) = (at.mean_slides, at.verdicts);
-        slides.points.push((n, mean));
-        let shown = percent(at.threshold);
-        slides.says.push(format!("at {shown} %: {mean:.2} slides"));
-        for (series, share) in told
-            .iter_mut()
-            .zip([v.wrong, v.new, v.changed, v.undecided])
-        {
-            let share = 100.0 * share;
-            series.points.push((n, share));
-            let name = &series.name;
-            series
-                .says
-                .push(format!("at {shown} %: {share:.2} % {name}"));
-        }
-    }
-    let used = |top: f64| Series::dashed("the threshold in use", vec![(at, 0.0), (at, top)]);
-    let most = |series: &[Series]| {
-        let points = series.iter().flat_map(|s| &s.points);
-        1.1 * points.map(|p| p.1).fold(0.1, f64::max)
-    };
-    let top = most(std::slice::from_ref(&slides));
-    let slides = Chart {
-        y_range: (0.0, top),
-        x_marks: thresholds.len(),
-        x_text: &text,
-        ..Chart::new(
-            "Slides by threshold",
-            x,
-            "slides until the answer (mean)",
-            x_range,
-            vec![used(top), slides],
-        )
-    }
-    .figure("slides-by-threshold")?;
-    let top = most(&told);
-    let [wrong, new, changed, undecided] = told;
-    let errors = Chart {
-        y_range: (0.0, top),
-        x_marks: thresholds.len(),
-        x_text: &text,
-        ..Chart::new(
-            "Errors by threshold",
-            x,
-            "explorations (%)",
-            x_range,
-            vec![used(top), wrong, new, changed, undecided],
-        )
-    }
-    .figure("errors-by-threshold")?;
-    Ok(vec![slides, errors])
 }

@@ -25,14 +25,6 @@ pub enum ReportError {
     /// A figure failed.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// A table does not become a file.
-    #[error("the table {table} of the report cannot be written; please report this")]
-    Table {
-        /// Name of its file, without the ending.
-        table: String,
-        /// The first row that does not fit.
-        source: csv::Error,
-    },
     /// The study does not become JSON.
     #[error("the study cannot be written as JSON; please report this")]
     Json(#[source] serde_json::Error),

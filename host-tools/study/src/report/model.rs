@@ -11,11 +11,8 @@ use crate::chart::Figure;
 /// The contents of a report: the page's template gives the place of each piece and the text about it.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Report {
-    /// Tables that the page shows, by the names of their files.
+    /// Tables that the page shows, by their names.
     pub(super) tables: BTreeMap<&'static str, Table>,
-    /// Tables that are too large to read: the page only names their files.
-    #[serde(skip)]
-    pub(super) files: BTreeMap<String, Table>,
     /// The panels of the page's figures, by figure.
     pub(super) figures: BTreeMap<&'static str, Vec<Figure>>,
     /// Values in the text, by section.
@@ -29,21 +26,11 @@ impl Report {
         self.tables.insert(
             id,
             Table {
-                header: owned(header),
+                header: header.iter().map(|&name| name.to_owned()).collect(),
                 rows,
             },
         );
     }
-
-    /// Adds a table that is too large to read.
-    pub(super) fn file(&mut self, id: &str, header: Vec<String>, rows: Rows) {
-        self.files.insert(id.to_owned(), Table { header, rows });
-    }
-}
-
-/// Names of columns.
-pub(super) fn owned(names: &[&str]) -> Vec<String> {
-    names.iter().map(|&name| name.to_owned()).collect()
 }
 
 /// A movement by its force in N and its speed in mm/s.
@@ -71,28 +58,11 @@ pub(super) struct Table {
     pub(super) rows: Rows,
 }
 
-impl Table {
-    /// The table as a file: every number with all its digits.
-    pub(super) fn csv(&self) -> Result<Vec<u8>, csv::Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&self.header)?;
-        for row in &self.rows {
-            writer.write_record(row.iter().map(|cell| &cell.exact))?;
-        }
-        writer
-            .into_inner()
-            .map_err(|failed| failed.into_error().into())
-    }
-}
-
 /// A cell of a table.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Cell {
     /// The text for people.
     shown: String,
-    /// The text for files: all digits.
-    #[serde(skip)]
-    exact: String,
     number: bool,
 }
 
@@ -105,8 +75,7 @@ pub(super) use cells;
 impl From<String> for Cell {
     fn from(words: String) -> Self {
         Self {
-            shown: words.clone(),
-            exact: words,
+            shown: words,
             number: false,
         }
     }
@@ -128,7 +97,6 @@ impl From<(f64, usize)> for Cell {
     fn from((value, decimals): (f64, usize)) -> Self {
         Self {
             shown: format!("{value:.decimals$}"),
-            exact: value.to_string(),
             number: true,
         }
     }

@@ -3,7 +3,7 @@
 use serde_json::json;
 use tactus_core::features::Movement;
 
-use super::model::{Cell, Report, axis, cells, movement_name, owned};
+use super::model::{Cell, Report, axis, cells, movement_name};
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::{COLOURS, Chart, DrawError, Figure, Mark, PANEL, Series};
 use crate::pilot::{Missed, MostUseful, Pilot, PilotMovement};
@@ -70,35 +70,6 @@ pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
         ],
         pilot.movements.iter().map(movement).collect(),
     );
-    let mut rows = Vec::new();
-    for (texture, movements) in pilot.textures.iter().zip(&pilot.properties) {
-        for (trials, m) in movements.iter().zip(&pilot.movements) {
-            for (trial, of) in (1_u8..).zip(trials) {
-                let [traction, roughness, fineness] = of.map(|p| (p, 4));
-                rows.push(cells![
-                    texture.number,
-                    texture.name,
-                    (m.force_n, 2),
-                    (m.speed_mm_s, 1),
-                    trial,
-                    traction,
-                    roughness,
-                    fineness,
-                ]);
-            }
-        }
-    }
-    let header = [
-        "texture",
-        "name",
-        "force, N",
-        "speed, mm/s",
-        "trial",
-        "traction, N",
-        "roughness",
-        "fineness",
-    ];
-    report.file("pilot-properties", owned(&header), rows);
     let drawn = |of: fn(&Pilot, &MostUseful) -> Result<Figure, DrawError>| {
         let figures = pilot.most_useful.iter().map(|useful| of(pilot, useful));
         figures.collect::<Result<Vec<_>, _>>()

@@ -467,6 +467,7 @@ fn what_the_host_found_out_is_shown() {
             background: 1.0,
             bands: Vec::new(),
             pressure: None,
+            pace: None,
         },
         posterior: Vec::from_slice(&posterior).unwrap(),
     });

@@ -398,8 +398,7 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
             table_bytes: 200,
             table_crc: 77,
             factory: false,
-            // the paper's scale, whatever its date
-            calibrated: 0,
+            calibrated: 20_261_121,
             counts: desk.counts(),
             skin_mj: (1500, 250),
             false_alarm: Some(0.1),
@@ -555,8 +554,8 @@ fn a_calibration_is_measured_reported_used_and_kept() {
     assert_eq!(kept(&mut probe), Some(used));
     let write = |bytes: &[u8]| Command::WriteCalibration(Vec::from_slice(bytes).unwrap());
     let short = command(&mut probe, write(&[0; 59])).unwrap_err();
-    assert_eq!(short, "a calibration has 60 or 64 bytes");
-    assert!(command(&mut probe, write(&[0xFF; 60])).is_err());
+    assert_eq!(short, "a calibration has 64 bytes");
+    assert!(command(&mut probe, write(&[0xFF; 64])).is_err());
     assert_eq!(
         (kept(&mut probe), probe.rig.state.calibration),
         (Some(used), used)

@@ -61,7 +61,7 @@ const MOVEMENTS: [Movement; 3] = [
 ];
 
 /// A table of so many textures, neighbours hard to tell apart, each learned from 5 slides of 3 movements.
-pub(super) fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
+fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let names: Vec<String> = (1..=textures).map(|t| format!("texture {t}")).collect();
     let slides: Vec<Vec<Vec<Observation>>> = names

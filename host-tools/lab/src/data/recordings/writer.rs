@@ -14,7 +14,7 @@ use super::files::{
     distinct_textures, inside, read_bounded, sha256,
 };
 use super::npy;
-use super::own::{COLUMNS, LABELS};
+use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 
@@ -268,6 +268,7 @@ fn row(
     row.push(day.unwrap_or_default());
     let pace = slide.pace.map(|pace| pace.to_string());
     row.push(pace.unwrap_or_default());
+    row.push(VERSION.to_string());
     Ok(row)
 }
 

@@ -176,15 +176,6 @@ fn three_explorations_of_each_texture_by_hand() {
     }
 }
 
-#[test]
-#[ignore = "fifty seeds of each finger, rig and hand; minutes"]
-fn fifty_seeds() {
-    for finger in FingerName::ALL {
-        explore_by_hand(finger, &world(11), 100..150);
-        explore_on_the_rig(finger, &world(11), 100..150);
-    }
-}
-
 /// The rig's fault, and the largest force on the finger by the world, N, when this broke: before anything moved, or
 /// 300 ms into a phase of a slide.
 fn broken(finger: FingerName, fault: PartFault, seed: u64, at: Phase) -> (Option<Fault>, f64) {
