@@ -8,12 +8,14 @@ mod config;
 mod confusions;
 mod early;
 mod episode;
-pub mod kernels;
+mod gaussians;
 mod likelihoods;
+mod likeness;
 mod novelty;
-pub mod overlap;
+mod overlap;
 mod paced;
 mod posterior;
+mod spread;
 mod student;
 mod verify;
 mod whitened;
@@ -24,7 +26,6 @@ pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strate
 pub use confusions::{Confusions, Degrees};
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
-pub use kernels::Kernels;
 pub use posterior::{Explorer, Told, Verdict};
 pub use verify::ENOUGH_TRIALS;
 

@@ -99,9 +99,7 @@ pub use slopes::{Pace, Slopes};
 pub(crate) use slopes::{SlopesView, moved};
 pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
-pub use whitening::{Row, Words};
 pub use whitening::{Slope, Whitening, white};
-pub(crate) use whitening::{dot, fill, products, words};
 
 #[cfg(test)]
 pub(crate) mod tests;

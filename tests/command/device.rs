@@ -23,7 +23,7 @@ use std::sync::mpsc::{self, Receiver as Told, Sender};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
 use tactus_core::probe::seams::{Panel, RigHandle as _};

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault, RigError};
 use tactus_core::wire::{Command, Event, Failure, Identify, Rejection, Verdict};
@@ -75,7 +75,7 @@ fn explore(
     let flash = RamFlash::blank();
     let probe = switch_on(rig, flash, table, &mut buffer, &plan, &host);
     let mut probe: SimProbe<'_, Heard, ArmRig> = probe.unwrap();
-    let done = block_on(probe.perform::<Plain>(&Command::Identify(identify)));
+    let done = block_on(probe.perform(&Command::Identify(identify)));
     for _ in 0..RESTS_MS {
         probe.rig.servo.tick();
     }
@@ -150,7 +150,7 @@ fn explored(seeds: std::ops::RangeInclusive<u64>) -> [[u32; 4]; 2] {
             let flash = RamFlash::blank();
             let probe = switch_on(rig, flash, &table, &mut buffer, &plan, &host);
             let mut probe: SimProbe<'_, Heard> = probe.unwrap();
-            block_on(probe.perform::<Plain>(&Command::Identify(identify))).unwrap();
+            block_on(probe.perform(&Command::Identify(identify))).unwrap();
             drop(probe);
             let heard = host.into_inner();
             let ours = count(heard.verdict.as_ref(), heard.slides);

@@ -1,7 +1,6 @@
 //! Hands that do not hold their speed, with a sensor of it, without one, and with one that has lost track, in the simulated world.
 
 use rayon::prelude::*;
-use tactus_core::dsp::Plain;
 use tactus_core::explorer::Method;
 use tactus_core::features::Observation;
 use tactus_core::handheld::{ASK_AFTER, FEATURES, MOVEMENT, judge_at_most};
@@ -56,7 +55,7 @@ impl Counts {
 
 /// Explores one texture by one slide.
 fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
-    let judged = judge_at_most::<Plain>(table, &slides[..1], None, None, ASK_AFTER).unwrap();
+    let judged = judge_at_most(table, &slides[..1], None, None, ASK_AFTER).unwrap();
     Counts {
         explored: 1,
         right: (judged.0.leading[0].0 == is).into(),

@@ -259,7 +259,7 @@ impl Training {
 
 /// Degree of confusion (eq. 7), by the core.
 fn degree(a: Gaussian, b: Gaussian) -> f32 {
-    confusion::<tactus_core::dsp::Plain>(a, b)
+    confusion(a, b)
 }
 
 /// Geometric mean of matrices, element by element.

@@ -8,8 +8,6 @@ use super::judge::{Judgement, MOVEMENT};
 use super::screen::{About, Screen};
 use super::speed::Moved;
 use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
-use crate::dsp;
-use crate::explorer::Kernels;
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
@@ -89,11 +87,11 @@ pub trait Hand {
 }
 
 /// A rig that is a person with a probe in the hand.
-pub struct ByHand<'p, H, K> {
+pub struct ByHand<'p, H> {
     /// Its parts.
     pub hand: H,
     /// State of the person's use: pages, touch and job.
-    pub handheld: Handheld<'p, K>,
+    pub handheld: Handheld<'p>,
     calibration: RigCalibration,
     skin: SkinCare,
     watch: Watch,
@@ -110,9 +108,9 @@ pub struct ByHand<'p, H, K> {
     serves: bool,
 }
 
-impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
+impl<'p, H: Hand> ByHand<'p, H> {
     /// A probe that was just switched on, with a fingertip of these constants.
-    pub fn new(hand: H, handheld: Handheld<'p, K>, calibration: RigCalibration) -> Self {
+    pub fn new(hand: H, handheld: Handheld<'p>, calibration: RigCalibration) -> Self {
         let mut by_hand = Self {
             hand,
             handheld,
@@ -240,7 +238,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
     }
 }
 
-impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
+impl<H: Hand> Rig for ByHand<'_, H> {
     type Error = RigError;
 
     fn measures(&self) -> PropertySet {
@@ -249,7 +247,7 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
             .collect()
     }
 
-    async fn perform<D: dsp::Kernels>(&mut self, slide: &mut Slide<'_, D>) -> Result<(), RigError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), RigError> {
         if slide.movement() != MOVEMENT {
             return Err(RigError::NotByHand);
         }
@@ -275,7 +273,7 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
     }
 }
 
-impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
+impl<H: Hand> RigHandle for ByHand<'_, H> {
     fn state(&self) -> RigState {
         // without words the finger's state is unknown
         let heard = self.handheld.listens();
@@ -455,15 +453,12 @@ impl<E: Events> Events for Shown<E> {
 }
 
 /// The probe in the hand of a person.
-pub type HandProbe<'m, H, K, F, B, E> = Probe<'m, ByHand<'m, H, K>, F, B, Shown<E>>;
+pub type HandProbe<'m, H, F, B, E> = Probe<'m, ByHand<'m, H>, F, B, Shown<E>>;
 
 /// A hundredth of a second of the person's own use, with the job on the table, if there is one; `log` gets the outcome.
-pub async fn step<H, K, F, B, E>(
-    probe: &mut HandProbe<'_, H, K, F, B, E>,
-    log: impl FnMut(Outcome<'_>),
-) where
+pub async fn step<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, log: impl FnMut(Outcome<'_>))
+where
     H: Hand,
-    K: Kernels,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -521,10 +516,9 @@ fn asked(command: &Command) -> (Asked, Option<Name>) {
 }
 
 /// Serves a request of the host, and shows its result.
-pub async fn serve<H, K, F, B, E>(probe: &mut HandProbe<'_, H, K, F, B, E>, request: &Request)
+pub async fn serve<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, request: &Request)
 where
     H: Hand,
-    K: Kernels,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -535,7 +529,7 @@ where
     probe.rig.serves = true;
     probe.events.told = false;
     let before = probe.memory.table().ok().map(|table| table.crc());
-    let done = probe.perform::<K>(&request.command).await;
+    let done = probe.perform(&request.command).await;
     let table = probe.memory.table().ok();
     let after = table.map(|table| (table.crc(), table.textures()));
     let rig = &mut probe.rig;

@@ -4,7 +4,6 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::judge::{Judgement, free_name, judge};
 use super::states::{Choice, Handheld, Job};
-use crate::explorer::Kernels;
 use crate::probe::Memory;
 use crate::probe::seams::{Events, StoredBytes};
 use crate::store::StoreError;
@@ -30,9 +29,9 @@ pub enum Outcome<'j> {
 }
 
 /// Does a job, and gives the handheld its outcome; `log` gets it first.
-pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
+pub async fn work<F: NorFlash, B: StoredBytes<F>>(
     job: Job,
-    handheld: &mut Handheld<'_, K>,
+    handheld: &mut Handheld<'_>,
     memory: &mut Memory<'_, F, B>,
     events: &mut impl Events,
     mut log: impl FnMut(Outcome<'_>),
@@ -43,8 +42,8 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                 Ok(table) => table,
                 Err(why) => return handheld.memory_failed(words(&why)),
             };
-            let judged = judge::<K>(table, &slides, reference, memory.false_alarm).map(
-                |(judgement, episode)| {
+            let judged =
+                judge(table, &slides, reference, memory.false_alarm).map(|(judgement, episode)| {
                     if let Some((texture, p)) = judgement.leading.first() {
                         log(Outcome::Judged {
                             slides: slides.len(),
@@ -53,8 +52,7 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                         });
                     }
                     (judgement, episode)
-                },
-            );
+                });
             match judged {
                 Ok((judgement, episode)) => {
                     memory.episode = Some(episode);

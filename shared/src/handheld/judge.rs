@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use crate::explorer::{
-    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
+    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
 use crate::probe::candidates;
@@ -74,7 +74,7 @@ pub enum JudgeError {
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
-pub fn judge<K: Kernels>(
+pub fn judge(
     table: Table<'_>,
     slides: &[Observation],
     reference: Option<u16>,
@@ -84,14 +84,14 @@ pub fn judge<K: Kernels>(
         Some(_) => ASK_AFTER,
         None => MAX_SLIDES,
     };
-    judge_at_most::<K>(table, slides, reference, false_alarm, most)
+    judge_at_most(table, slides, reference, false_alarm, most)
 }
 
 /// The same where `most` slides, up to 255, are the last ones, sure or not.
 ///
 /// # Errors
 /// See [`judge`].
-pub fn judge_at_most<K: Kernels>(
+pub fn judge_at_most(
     table: Table<'_>,
     slides: &[Observation],
     reference: Option<u16>,
@@ -106,7 +106,7 @@ pub fn judge_at_most<K: Kernels>(
         verify: reference.is_some(),
         ..Config::default()
     };
-    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    let mut explorer = Explorer::<'_, MAX_TEXTURES>::empty(table);
     let among = candidates(reference.as_slice(), table.textures());
     explorer
         .consider(PropertySet::default(), config, among)

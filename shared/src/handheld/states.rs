@@ -17,7 +17,6 @@ use super::speed::Moved;
 use super::spelling::Spelling;
 use super::touch::Touch;
 use crate::dsp::Plan;
-use crate::explorer::Kernels;
 use crate::features::Observation;
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
@@ -119,8 +118,8 @@ enum Page {
 type Note = (u16, u8);
 
 /// The probe.
-pub struct Handheld<'p, K> {
-    touch: Touch<'p, K>,
+pub struct Handheld<'p> {
+    touch: Touch<'p>,
     button: Button,
     page: Page,
     /// Ticks since the page began, and since anything happened.
@@ -159,7 +158,7 @@ const SURE_IT_IS: &[Note] = &[(2000, 8), (2400, 8), (2700, 16)];
 const NOT_KNOWN: &[Note] = &[(1800, 10), (0, 4), (1400, 16)];
 const ALARM: &[Note] = &[(700, 30), (0, 10), (700, 30)];
 
-impl<'p, K: Kernels> Handheld<'p, K> {
+impl<'p> Handheld<'p> {
     /// A probe that was just switched on, with a table of so many textures.
     pub fn new(plan: &'p Plan, textures: u16) -> Self {
         Self {

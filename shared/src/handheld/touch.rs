@@ -10,7 +10,6 @@ use super::guidance::{Again, Event, Phase, View, Way, ZONE_MN};
 use super::judge::MOVEMENT;
 use super::speed::{Moved, Speedometer};
 use crate::dsp::Plan;
-use crate::explorer::Kernels;
 use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
@@ -70,12 +69,12 @@ pub struct Taken {
 }
 
 /// Follows touches.
-pub struct Touch<'p, K> {
+pub struct Touch<'p> {
     plan: &'p Plan,
     /// Contact force of one count of P_DC, mN.
     mn_per_count: f32,
     taken: Taken,
-    slide: Slide<'p, K>,
+    slide: Slide<'p>,
     blocks: Blocks,
     phase: Phase,
     /// Still blocks since the press, and the sum of their liveliness.
@@ -115,7 +114,7 @@ pub struct Touch<'p, K> {
     speed: Speedometer,
 }
 
-impl<'p, K: Kernels> Touch<'p, K> {
+impl<'p> Touch<'p> {
     /// No slide yet.
     pub fn new(plan: &'p Plan) -> Self {
         Self {
@@ -175,7 +174,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
     }
 
     /// The slide that was good last, until the finger is pressed again.
-    pub fn slide(&self) -> &Slide<'p, K> {
+    pub fn slide(&self) -> &Slide<'p> {
         &self.slide
     }
 
@@ -560,7 +559,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         self.take(last);
         let seconds = STEADY as f32 / RATE_HZ as f32;
         self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
-        let mut slide = Slide::<K>::new(self.plan, MOVEMENT);
+        let mut slide = Slide::new(self.plan, MOVEMENT);
         slide.adopt(&self.slide);
         match slide.finish() {
             Ok(measurement) => Event::Slid(Observation::from(&measurement)),

@@ -4,7 +4,6 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::by_hand::{ByHand, Hand};
-use crate::explorer::Kernels;
 use crate::probe::Memory;
 use crate::probe::calibrate::keep;
 use crate::probe::seams::{RigHandle, StoredBytes};
@@ -21,7 +20,7 @@ const NOT_KEPT: &str = "Not kept. Restart it.";
 /// Text of the display if P_DC falls under a weight.
 const FALLS: &str = "P_DC falls. Swap the cell's wires.";
 
-impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
+impl<H: Hand> ByHand<'_, H> {
     /// Asks for the finger in the air and for each of [`WEIGHTS_MN`] on it, keeps the result, and shows it.
     pub(super) async fn set_force<F: NorFlash, B: StoredBytes<F>>(
         &mut self,

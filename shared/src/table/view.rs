@@ -6,7 +6,7 @@ use super::format::{
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::Whitened;
-use super::whitening::{Column, Row, View, Whitening, Words};
+use super::whitening::{Column, View, Whitening};
 use crate::CRC32;
 use crate::features::{MAX_FEATURES, Movement, Property, PropertySet, Vector};
 
@@ -508,17 +508,6 @@ impl<'a> Table<'a> {
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
         let (bytes, known) = self.bytes_from_whitening(movement)?;
         Some(View::checked(bytes, known).apply(features))
-    }
-
-    /// As [`Table::whiten`], with other code for the products.
-    pub(crate) fn whiten_by(
-        &self,
-        movement: u8,
-        features: &[i16],
-        products: fn(&Row, &Words) -> i64,
-    ) -> Option<Vector> {
-        let (bytes, known) = self.bytes_from_whitening(movement)?;
-        Some(View::checked(bytes, known).apply_by(features, products))
     }
 
     fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {

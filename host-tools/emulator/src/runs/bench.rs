@@ -24,7 +24,7 @@ use tactus_lab::sim::collection::Collection;
 use self::counter::Bench;
 use self::error::BenchError;
 use self::gates::{GATES, gate};
-use self::inputs::{SLIDE, Wanted, corners, extremes, observed, of_gates, slide};
+use self::inputs::{SLIDE, Wanted, extremes, observed, of_gates, slide};
 use self::on_the_rig::on_the_rig;
 use self::row::{Row, print};
 use self::workload::Workload;
@@ -77,7 +77,6 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         return Ok(rows.iter().all(Row::ok));
     }
     let mut bench = Bench::start(&args.firmware.elf, false)?;
-    corners(&mut bench)?;
     extremes(&mut bench)?;
     if text {
         bench = Bench::start(&args.firmware.elf, true)?;

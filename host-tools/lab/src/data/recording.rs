@@ -1,8 +1,6 @@
 //! One recorded slide: the movement that made it, its blocks of samples, and what no block has.
 
 use std::ops::Range;
-
-use tactus_core::dsp::Kernels;
 use tactus_core::features::{Block, Movement, Slide};
 use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::RATE_HZ;
@@ -140,7 +138,7 @@ impl Recording {
     }
 
     /// Gives all samples to the core, as a rig would.
-    pub fn play<K: Kernels>(&self, slide: &mut Slide<'_, K>) {
+    pub fn play(&self, slide: &mut Slide<'_>) {
         if let Some(power) = self.background {
             slide.set_background(power);
         }

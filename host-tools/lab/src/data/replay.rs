@@ -3,7 +3,7 @@
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::dsp::{Kernels, Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
 use tactus_core::rig::Rig;
 
@@ -15,7 +15,7 @@ use crate::data::recordings::{RecordingError, RecordingSet};
 /// # Errors
 /// The slide has none: it is too short or silent.
 pub fn measure(plan: &Plan, recorded: &Recording) -> Result<Measurement, SlideError> {
-    let mut slide = Slide::<Plain>::new(plan, recorded.movement);
+    let mut slide = Slide::new(plan, recorded.movement);
     recorded.play(&mut slide);
     slide.finish()
 }
@@ -186,7 +186,7 @@ impl Rig for Replay {
         self.measures
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), ReplayError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), ReplayError> {
         let movement = slide.movement();
         let recorded = (0..).zip(&self.slides);
         let recorded: Vec<usize> = recorded
@@ -230,7 +230,7 @@ mod tests {
         let mut rig = Replay::new(slides, ChaCha8Rng::seed_from_u64(1));
         let mut seen = Vec::new();
         let mut slide = |movement| {
-            let mut slide = Slide::<Plain>::new(&plan, movement);
+            let mut slide = Slide::new(&plan, movement);
             block_on(rig.perform(&mut slide))?;
             Ok(slide.finish().unwrap().properties)
         };

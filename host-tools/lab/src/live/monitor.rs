@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use tactus_core::dsp::{Plain, SpectrumSum};
+use tactus_core::dsp::SpectrumSum;
 use tactus_core::explorer::Config;
 use tactus_core::features::{BLOCK, Block, Observation};
 use tactus_core::table::Table;
@@ -238,7 +238,7 @@ pub fn spectra(pac: &[i16]) -> Vec<Vec<i8>> {
 /// The power of these samples, dB per four bins.
 fn spectrum(samples: &[i16]) -> Option<Vec<i8>> {
     let mut sum = SpectrumSum::default();
-    sum.push::<Plain>(PLAN.angles(), samples);
+    sum.push(&PLAN, samples);
     let spectrum = sum.finish()?;
     let bins = spectrum.psd().get(1..)?.chunks_exact(BINS);
     let db = |bins: &[f32]| {

@@ -8,7 +8,6 @@ use std::task::{Context, Waker};
 use std::time::Duration;
 
 use embassy_futures::yield_now;
-use tactus_core::dsp::Plain;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, Slide};
 use tactus_core::probe::seams::RigHandle as _;
@@ -342,7 +341,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
                 }
                 id = u16::wrapping_add(id, 1);
                 let request = wire::Request { id, command };
-                probe.serve::<Plain>(&request).await;
+                probe.serve(&request).await;
             }
             Job::Move(movement, seed) => {
                 let made = make(&mut probe, &scene, movement, seed).await;
@@ -362,7 +361,7 @@ async fn make<'p>(
 ) -> Happening {
     probe.memory.episode = None;
     probe.rig.begin(seed).await;
-    let mut slide = Slide::<Plain>::new(&PLAN, movement);
+    let mut slide = Slide::new(&PLAN, movement);
     let made = match probe.rig.perform(&mut slide).await {
         Ok(()) => probe.rig.lifted().await,
         Err(why) => Err(why),

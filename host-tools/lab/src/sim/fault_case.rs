@@ -14,7 +14,7 @@ use embassy_futures::block_on;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus_core::dsp::{self, Plain};
+use tactus_core::dsp;
 use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::Unguarded;
@@ -418,7 +418,7 @@ fn now_ns(probe: &mut SimProbe<'_, HostLog>) -> u64 {
 
 /// Sends the probe a command; returns the reason why it was not done, in its words.
 fn send(probe: &mut SimProbe<'_, HostLog>, command: Command) -> Result<(), String> {
-    block_on(probe.perform::<Plain>(&command)).map_err(|why| why.to_string())
+    block_on(probe.perform(&command)).map_err(|why| why.to_string())
 }
 
 fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {

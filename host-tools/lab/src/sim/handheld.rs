@@ -3,7 +3,7 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Observation;
 use tactus_core::handheld::guidance::{Again, Event};
@@ -127,7 +127,7 @@ impl Person {
     /// Lets so much time pass; the first event for which `until` holds ends it.
     fn run_until(
         &mut self,
-        touch: &mut Touch<'_, Plain>,
+        touch: &mut Touch<'_>,
         seconds: f64,
         until: impl Fn(&Event) -> bool,
     ) -> Option<Event> {
@@ -148,7 +148,7 @@ impl Person {
     }
 
     /// Presses and slides as the probe prompts: returns the slide, or its fault; `None` if nothing was noticed.
-    pub fn slide(&mut self, touch: &mut Touch<'_, Plain>) -> Option<Result<Observation, Again>> {
+    pub fn slide(&mut self, touch: &mut Touch<'_>) -> Option<Result<Observation, Again>> {
         let target_n = f64::from(<(u16, u32)>::from(MOVEMENT).0) * 1e-3;
         let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
         let force_n = target_n * exp(self.manner.force_spread * self.normal());
@@ -190,7 +190,7 @@ pub fn slides(
     wanted: u32,
 ) -> Result<(Vec<Observation>, u32), HandError> {
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     let mut person = Person::new(setup, manner);
     touch.calibrate(person.reader.model().calibration.force_mn_per_count);
     person.run_until(&mut touch, 0.5, |event| *event == Event::Zeroed);
@@ -290,7 +290,7 @@ mod tests {
             let mut judged = (1..=ASK_AFTER).map(|n| {
                 (
                     n,
-                    judge_at_most::<Plain>(table, &measured[..n], None, None, ASK_AFTER)
+                    judge_at_most(table, &measured[..n], None, None, ASK_AFTER)
                         .unwrap()
                         .0,
                 )
@@ -370,7 +370,7 @@ mod tests {
         let burlap = texture_number("burlap").unwrap();
         let plan = Plan::new();
         for trial in 100..108 {
-            let mut touch = Touch::<Plain>::new(&plan);
+            let mut touch = Touch::new(&plan);
             let mut person = Person::new(world(1).setup(burlap, trial), Manner::default());
             person.intend(0.5, 0.0);
             let still = person.run_until(&mut touch, 5.0, |event| *event == Event::Still);

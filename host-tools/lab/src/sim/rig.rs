@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus_core::dsp::Kernels;
 use tactus_core::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
 use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
@@ -485,14 +484,14 @@ impl Rig for SimRig {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), SimError> {
         self.perform_until(slide, &mut |_| false).await
     }
 
-    async fn perform_until<K: Kernels>(
+    async fn perform_until(
         &mut self,
-        slide: &mut Slide<'_, K>,
-        enough: Enough<'_, K>,
+        slide: &mut Slide<'_>,
+        enough: Enough<'_>,
     ) -> Result<(), SimError> {
         if self.control.phase() == Phase::Parked {
             self.home()?;

@@ -1,7 +1,7 @@
 //! A person of made-up words who does what the probe prompts.
 
 use super::*;
-use crate::dsp::{Plain, Plan};
+use crate::dsp::Plan;
 use crate::explorer::{Answer, Verification};
 use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
@@ -177,7 +177,7 @@ impl Hand for Obedient {
     }
 }
 
-type Held<'p> = ByHand<'p, Obedient, Plain>;
+type Held<'p> = ByHand<'p, Obedient>;
 
 fn held(plan: &Plan) -> Held<'_> {
     ByHand {
@@ -203,7 +203,7 @@ fn a_person_makes_the_slide_that_is_asked_for_and_its_samples_are_the_hosts() {
     let plan = Plan::new();
     let mut rig = held(&plan);
     rig.hand.streams = true;
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     block_on(rig.perform(&mut slide)).unwrap();
     block_on(rig.lifted()).unwrap();
     let measured = slide.finish().unwrap();
@@ -211,7 +211,7 @@ fn a_person_makes_the_slide_that_is_asked_for_and_its_samples_are_the_hosts() {
     assert_eq!(prompts(&rig), expected);
     assert_eq!(rig.hand.shown, ["Press", "Slide", "Lift"]);
     // the same slide, from the streamed samples
-    let mut streamed = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut streamed = Slide::new(&plan, MOVEMENT);
     let (mut pdc, mut steady) = (List::new(), 0..0);
     for event in &rig.hand.told {
         match event {
@@ -247,7 +247,7 @@ fn a_slide_that_is_no_good_is_asked_for_again_with_the_reason() {
     let mut rig = held(&plan);
     rig.hand.presses_mn = 1600.0;
     rig.hand.stops = Some(600);
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     assert_eq!(block_on(rig.perform(&mut slide)), Err(RigError::Stopped));
     assert!(prompts(&rig).contains(&Prompt::Again(Again::TooHard)));
     // nothing is wanted any more
@@ -258,7 +258,7 @@ fn a_slide_that_is_no_good_is_asked_for_again_with_the_reason() {
 fn nobody_there_a_person_who_gives_up_and_another_movement_end_it() {
     let plan = Plan::new();
     let ends = |mut rig: Held<'_>, movement| {
-        let mut slide = Slide::<Plain>::new(&plan, movement);
+        let mut slide = Slide::new(&plan, movement);
         let done = block_on(rig.perform(&mut slide));
         assert_eq!(rig.handheld.prompt(), None);
         (done.unwrap_err(), rig.hand.ticks)
@@ -283,7 +283,7 @@ fn the_host_is_reminded_every_second_that_a_person_is_waited_for() {
     let mut rig = held(&plan);
     rig.hand.presses_mn = 0.0;
     rig.hand.stops = Some(10 * TICKS_HZ);
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     let _ = block_on(rig.perform(&mut slide));
     let told = rig.hand.told.iter();
     let prompts = told.filter(|event| matches!(event, Event::Prompt(_)));
@@ -309,7 +309,7 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
     kept.pressure.force_mn_per_count = ForceScale::of(&points).unwrap().mn_per_count;
     block_on(rig.set_calibration(kept)).unwrap();
     // 0.5 N of this finger is 0.5 N now, and can be slid with
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     block_on(rig.perform(&mut slide)).unwrap();
     let force_mn = rig.state().force_mn;
     assert!((force_mn - 500.0).abs() < 15.0, "{force_mn}");

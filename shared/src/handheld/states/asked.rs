@@ -2,7 +2,6 @@
 //! are those of the person's own use; the measurement belongs to the host.
 
 use super::{Answer, Asked, Handheld, Page};
-use crate::explorer::Kernels;
 use crate::features::Slide;
 use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
@@ -14,7 +13,7 @@ use crate::rig::{self, Fault};
 use crate::table::Name;
 use crate::wire::Prompt;
 
-impl<'p, K: Kernels> Handheld<'p, K> {
+impl<'p> Handheld<'p> {
     fn ask(&mut self, asked: Asked, page: Page) {
         self.clear_episode();
         self.job = None;
@@ -151,7 +150,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The slide that was good last, until the finger is pressed again.
-    pub fn slide(&self) -> &Slide<'p, K> {
+    pub fn slide(&self) -> &Slide<'p> {
         self.touch.slide()
     }
 

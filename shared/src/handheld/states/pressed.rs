@@ -2,13 +2,12 @@
 
 use super::lists::{Entry, List};
 use super::{Answer, CLICK, Choice, DARK_AFTER, Handheld, Job, LEARNED, NO_WORDS, Page};
-use crate::explorer::Kernels;
 use crate::handheld::button::Press;
 use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::spelling::{Spelling, Taken};
 
-impl<K: Kernels> Handheld<'_, K> {
+impl Handheld<'_> {
     /// A hundredth of a second, with the level of the button.
     pub fn tick(&mut self, pressed: bool) {
         self.shown = self.shown.saturating_add(1);

@@ -1,7 +1,6 @@
 //! Tests of the probe's states under any events; with made-up slides, since touches have tests of their own.
 
 use super::*;
-use crate::dsp::Plain;
 use crate::explorer::EpisodeSummary;
 use crate::handheld::draw;
 use crate::handheld::judge::{FEATURES, free_name, judge};
@@ -73,7 +72,7 @@ fn slide(texture: Option<usize>) -> Observation {
 
 /// A probe, its table, and the name that was learned.
 struct Bench<'p> {
-    probe: Handheld<'p, Plain>,
+    probe: Handheld<'p>,
     table: List<u8>,
     learned: List<(Choice, u8)>,
     episode: Option<EpisodeSummary>,
@@ -98,7 +97,7 @@ impl<'p> Bench<'p> {
         reference: Option<u16>,
     ) -> Result<(Judgement, EpisodeSummary), JudgeError> {
         let table = Table::read(&self.table).unwrap();
-        judge::<Plain>(table, slides, reference, None)
+        judge(table, slides, reference, None)
     }
 
     fn work(&mut self) {
@@ -557,7 +556,7 @@ proptest! {
     #[test]
     fn whatever_happens_only_good_slides_count(steps in proptest::collection::vec(happens(), 1..80)) {
         let plan = Plan::new();
-        let mut probe = Handheld::<Plain>::new(&plan, 4);
+        let mut probe = Handheld::new(&plan, 4);
         let bytes = table();
         let table = Table::read(&bytes).unwrap();
         let mut good: List<Observation> = List::new();

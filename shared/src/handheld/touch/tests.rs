@@ -1,7 +1,6 @@
 //! Touches of made-up signals: a finger on a spring, vibrations of noise.
 
 use super::*;
-use crate::dsp::Plain;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::Counts;
 use proptest::prelude::*;
@@ -65,7 +64,7 @@ fn words(parts: &[Part]) -> List<Option<Pressure>> {
 
 fn feel(words: &[Option<Pressure>]) -> List<Event> {
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     words.iter().filter_map(|word| touch.word(*word)).collect()
 }
 
@@ -167,7 +166,7 @@ fn a_lost_word_spoils_a_slide_and_only_delays_a_press() {
     assert!(matches!(events.last(), Some(Event::Slid(_))), "{events:?}");
     // words that were lost on the way count as much
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     let mut spoiled = None;
     for (n, word) in words(&slide).into_iter().enumerate() {
         if n == 8800 {
@@ -274,7 +273,7 @@ proptest! {
 /// Events of a probe whose sensor of motion reports every 10 ms, from the beginning of the parts: for so long, counts.
 fn feel_moving(parts: &[Part], seen: &[(f64, Moved)]) -> List<Event> {
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     let each = seen.iter();
     let mut readings = each.flat_map(|(s, moved)| std::vec![*moved; (s * 100.0) as usize]);
     let mut events = List::new();

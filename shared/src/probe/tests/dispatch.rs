@@ -1,7 +1,6 @@
 //! A probe with a scripted rig and a store in RAM is asked everything.
 
 use super::*;
-use crate::dsp::Plain;
 use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
@@ -46,7 +45,7 @@ impl Rig for Bench {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error> {
         self.state.skin = SkinCare::after(self.state.skin.energy_j() + 1.0, 0.5);
         self.script.perform(slide).await
     }
@@ -251,7 +250,7 @@ fn a_table_whose_bytes_have_changed_is_reported_whatever_is_in_its_place() {
 }
 
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
-    let done = block_on(probe.perform::<Plain>(&command));
+    let done = block_on(probe.perform(&command));
     done.map_err(|why| why.to_string())
 }
 
@@ -447,9 +446,9 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
 fn a_request_is_answered_by_its_number_when_it_is_over() {
     let mut probe = probe();
     let request = |id, command| Request { id, command };
-    block_on(probe.serve::<Plain>(&request(3, Command::Home)));
+    block_on(probe.serve(&request(3, Command::Home)));
     probe.rig.refuses = true;
-    block_on(probe.serve::<Plain>(&request(4, Command::Home)));
+    block_on(probe.serve(&request(4, Command::Home)));
     let jams = Event::Refused {
         id: 4,
         why: Failure::Rig(JAMS),

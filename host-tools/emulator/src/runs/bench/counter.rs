@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_world::world::Setup;
 
 use super::error::BenchError;
@@ -154,7 +154,7 @@ impl Bench {
         let spent: CycleCount = self.emulator.cycle_profile()?.total(0..1);
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);
-        workload::run::<Plain>(workload, &self.plan, table, words, &mut Uncounted, &mut put)
+        workload::run(workload, &self.plan, table, words, &mut Uncounted, &mut put)
             .ok_or_else(|| unsuitable(workload, "its words make no sense"))?;
         let instructions = instructions.saturating_sub(self.overhead);
         // the few instructions round them are told apart by what they take on the average

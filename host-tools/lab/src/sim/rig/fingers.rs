@@ -8,7 +8,7 @@ use crate::sim::handheld;
 use crate::sim::rig::{Performed, SimError, SimRig};
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, PropertySet};
 use tactus_core::handheld::{ASK_AFTER, judge_at_most};
@@ -138,7 +138,7 @@ fn explore_by_hand(finger: FingerName, world: &Collection, trials: Range<u64>) -
             let (measured, _) = handheld::slides(setup, Manner::default(), 5).unwrap();
             let judged = (1..=ASK_AFTER)
                 .map(|n| {
-                    judge_at_most::<Plain>(table, &measured[..n], None, None, ASK_AFTER)
+                    judge_at_most(table, &measured[..n], None, None, ASK_AFTER)
                         .unwrap()
                         .0
                 })
