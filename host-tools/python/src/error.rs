@@ -16,7 +16,7 @@ use tactus::eval::learn::TableError as LearnError;
 use tactus::eval::verify::VerifyError;
 use tactus::link::line::LineError;
 use tactus::link::log::LogError;
-use tactus::link::{LinkError, PortError};
+use tactus::link::{LinkError, OperationError};
 use tactus::sim::collection::TrialError;
 use tactus::sim::rig::SimError;
 use tactus_core::explorer::{ExplorerError, ObserveError};
@@ -122,7 +122,7 @@ raise! {
     SimError => SimulationError,
     LineError => ProbeError,
     LinkError => ProbeError,
-    PortError => ProbeError,
+    OperationError => ProbeError,
     LogError => ProbeError,
     TrialError => SimulationError,
 }

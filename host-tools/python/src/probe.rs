@@ -3,18 +3,22 @@
 use std::collections::VecDeque;
 use std::fs::File;
 use std::path::PathBuf;
+use std::pin::Pin;
 use std::sync::{Mutex, PoisonError};
 use std::task::Poll;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tactus::data::recorder::Recorder;
+use tactus::link::lifting::Stopped;
 use tactus::link::line::{Line, found, only_nucleo, open};
+use tactus::link::lock::PortLock;
 use tactus::link::log::{self, Log};
-use tactus::link::owner::Owner;
-use tactus::link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
+use tactus::link::operations::{self, Sample};
+use tactus::link::{OperationError, Port, PortError, PushTable, Request, Transaction};
+use tactus::link::{Probe as Linked, say};
+use tactus::remote::operations::{Wanted, record};
 use tactus_core::table::{Name, Table as Read};
 use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
 
@@ -24,9 +28,6 @@ use crate::recordings::Slide;
 use crate::table::Table;
 use crate::values::object;
 
-/// Longest that a request takes to end after it was stopped: the way up, and what may be stored first.
-const STOPPING: Duration = Duration::from_secs(35);
-
 /// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a probe that says
 /// nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests and reports, as
 /// `tactus device --log FILE` writes it, for `read_log`, `tactus device log` and `tactus convert`.
@@ -35,71 +36,79 @@ const STOPPING: Duration = Duration::from_secs(35);
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Probe {
     name: String,
-    /// What is to be sent while something is under way: whoever reads the port sends it.
-    outgoing: Mutex<Vec<Command>>,
+    linked: Linked,
     inner: Mutex<Option<Inner>>,
 }
+
+/// A request under way.
+type Job = Pin<Box<dyn Future<Output = Result<(), OperationError>> + Send>>;
 
 struct Inner {
     port: Port<Box<dyn Line>>,
     log: Option<Log>,
     /// what is under way, and the reports of it that nobody has taken yet
-    job: Option<Job<Request<()>>>,
+    job: Option<Job>,
     reports: VecDeque<Report>,
-    _owner: Owner,
+    _lock: PortLock,
 }
 
 impl Inner {
-    fn asks(&mut self, command: &Command) {
-        if let Some(log) = &mut self.log {
-            log.asked(command);
+    /// Polls an operation once, and keeps what came.
+    fn poll<F: Future>(&mut self, operation: Pin<&mut F>) -> PyResult<Poll<F::Output>> {
+        let polled = self.port.poll(operation);
+        for line in self.port.probe().said() {
+            if let Some(log) = &mut self.log {
+                log.line(&line);
+            }
+            if let log::Line::Report(report) = line {
+                self.reports.push_back(report.into_owned());
+            }
         }
+        // a program has the results
+        self.port.probe().take_words();
+        // what was said is in the file before it is believed
+        self.log.as_mut().map_or(Ok(()), Log::flush)?;
+        Ok(polled)
     }
 
-    /// Begins a transaction; its first request is in the log.
-    fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, PortError> {
-        let job = self.port.begin(transaction)?;
-        if let Some(command) = job.command() {
-            self.asks(&command.clone());
-        }
-        Ok(job)
-    }
-
-    /// Reads once, and keeps what came.
-    fn step(&mut self) -> Result<(), PortError> {
-        let Some(job) = &mut self.job else {
+    /// Reads once for what is under way.
+    fn step(&mut self) -> PyResult<()> {
+        let Some(mut job) = self.job.take() else {
             return Ok(());
         };
-        let (reports, log) = (&mut self.reports, &mut self.log);
-        let stepped = self.port.step(job, |report| {
-            if let Some(log) = log {
-                log.told(report);
+        match self.poll(Pin::new(&mut job))? {
+            Poll::Ready(done) => done.map_err(|why| why.raise()),
+            Poll::Pending => {
+                self.job = Some(job);
+                Ok(())
             }
-            reports.push_back(report.clone());
-        });
-        if !matches!(stepped, Ok(Poll::Pending)) {
-            self.job = None;
         }
-        stepped.map(|_| ())
     }
 
     /// Stops what is under way, and waits until the finger is lifted.
-    fn stop(&mut self) -> Result<(), PortError> {
-        if self.job.is_none() {
+    fn stop(&mut self) -> PyResult<()> {
+        let Some(mut job) = self.job.take() else {
             return Ok(());
-        }
-        self.asks(&Command::Stop);
-        self.port.send(Command::Stop)?;
-        let began = Instant::now();
-        while self.job.is_some() && began.elapsed() < STOPPING {
-            match self.step() {
-                // a request that was stopped is refused
-                Err(PortError::Link(_)) | Ok(()) => {}
-                Err(why) => return Err(why),
+        };
+        self.port.probe().stop();
+        let done = loop {
+            if let Poll::Ready(done) = self.poll(Pin::new(&mut job))? {
+                break done;
             }
-        }
+        };
+        self.port.probe().clear_stop();
         self.reports.clear();
-        Ok(())
+        match done {
+            Ok(())
+            | Err(
+                OperationError::Stopped(Stopped::Lifted)
+                | OperationError::Port {
+                    why: PortError::Link(_),
+                    ..
+                },
+            ) => Ok(()),
+            Err(why) => Err(why.raise()),
+        }
     }
 }
 
@@ -108,44 +117,48 @@ impl Probe {
     fn with<T: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Inner) -> Result<T, PortError> + Send,
+        work: impl FnOnce(&mut Inner) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         py.detach(|| {
             let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let inner = inner.as_mut();
-            let inner = inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?;
-            let done = work(inner).map_err(|why| why.raise_of(&self.name))?;
-            // what was said is in the file before it is believed
-            inner.log.as_mut().map_or(Ok(()), Log::flush)?;
-            Ok(done)
+            work(inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?)
         })
     }
 
-    /// Runs a transaction that moves nothing to its end.
-    fn complete<E: Transaction + Send>(
+    /// Does an operation. Ctrl-C stops it, and the rig with it.
+    fn complete<T: Send>(
         &self,
         py: Python<'_>,
-        transaction: E,
-    ) -> PyResult<E::Outcome>
+        operation: impl Future<Output = Result<T, OperationError>> + Send,
+    ) -> PyResult<T> {
+        self.idle(py)?;
+        let mut operation = std::pin::pin!(operation);
+        let mut signal = Ok(());
+        let done = loop {
+            let polled = self.with(py, |inner| inner.poll(operation.as_mut()))?;
+            if let Poll::Ready(done) = polled {
+                break done;
+            }
+            if signal.is_ok() {
+                signal = py.check_signals();
+                if signal.is_err() {
+                    self.linked.stop();
+                }
+            }
+        };
+        if signal.is_err() {
+            self.linked.clear_stop();
+        }
+        signal.and_then(|()| done.map_err(|why| why.raise()))
+    }
+
+    /// Does one request.
+    fn get<E: Transaction + Send>(&self, py: Python<'_>, request: E) -> PyResult<E::Outcome>
     where
         E::Outcome: Send,
     {
-        self.idle(py)?;
-        let mut job = self.with(py, |inner| inner.begin(transaction))?;
-        loop {
-            let stepped = self.with(py, |inner| {
-                let log = &mut inner.log;
-                inner.port.step(&mut job, |report| {
-                    if let Some(log) = log {
-                        log.told(report);
-                    }
-                })
-            })?;
-            if let Poll::Ready(outcome) = stepped {
-                return Ok(outcome);
-            }
-            py.check_signals()?;
-        }
+        self.complete(py, self.linked.get(request))
     }
 
     fn idle(&self, py: Python<'_>) -> PyResult<()> {
@@ -160,9 +173,11 @@ impl Probe {
     fn begin(slf: &Bound<'_, Self>, command: Command) -> PyResult<Events> {
         let (probe, py) = (slf.get(), slf.py());
         probe.idle(py)?;
+        let linked = probe.linked.clone();
+        let job = async move { linked.get(Request::command(command)).await };
         probe.with(py, |inner| {
             inner.reports.clear();
-            inner.job = Some(inner.begin(Request::command(command))?);
+            inner.job = Some(Box::pin(job));
             Ok(())
         })?;
         Ok(Events {
@@ -177,11 +192,6 @@ impl Probe {
                 if let Some(report) = inner.reports.pop_front() {
                     return Ok((Some(report), true));
                 }
-                let mut outgoing = self.outgoing.lock().unwrap_or_else(PoisonError::into_inner);
-                for command in outgoing.drain(..) {
-                    inner.port.send(command)?;
-                }
-                drop(outgoing);
                 inner.step()?;
                 let report = inner.reports.pop_front();
                 Ok((report, inner.job.is_some() || !inner.reports.is_empty()))
@@ -227,8 +237,7 @@ fn seed_of_now() -> u32 {
 }
 
 fn name_of(name: &str) -> PyResult<Name> {
-    let name = Name::try_from(name.trim()).ok().filter(|n| !n.is_empty());
-    name.ok_or_else(|| PyValueError::new_err("the name of a texture has 1 to 40 bytes"))
+    say::name_of(name).map_err(|why| PyValueError::new_err(why.to_string()))
 }
 
 /// "Busy", "Pressed", ..., or {"Slid": {"length_um": ..., "speed_um_s": ...}}, as on the link.
@@ -261,22 +270,23 @@ impl Probe {
     ) -> PyResult<Self> {
         let timeout = Duration::try_from_secs_f64(timeout_s)
             .map_err(|why| PyValueError::new_err(format!("timeout_s: {why}")))?;
-        let (name, line, owner) = py
+        let (name, line, lock) = py
             .detach(|| {
                 let name = port.map_or_else(|| only_nucleo(found()), Ok)?;
-                open(&name).map(|(line, owner)| (name, line, owner))
+                open(&name).map(|(line, lock)| (name, line, lock))
             })
             .map_err(|why| why.raise())?;
         let log = log.map(|path| Log::create(&path, &name)).transpose()?;
+        let linked = Linked::new(&name, timeout, timeout);
         Ok(Self {
             name,
-            outgoing: Mutex::default(),
+            linked: linked.clone(),
             inner: Mutex::new(Some(Inner {
-                port: Port::new(line, timeout),
+                port: Port::new(line, linked),
                 log,
                 job: None,
                 reports: VecDeque::new(),
-                _owner: owner,
+                _lock: lock,
             })),
         })
     }
@@ -289,32 +299,32 @@ impl Probe {
 
     /// How the probe is: a dict with phase, fault, textures, table_crc, finger, counts and so on, as on the link.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        object(py, &self.complete(py, Request::status())?)
+        object(py, &self.get(py, Request::status())?)
     }
 
     /// The `Table` in use.
     fn table(&self, py: Python<'_>) -> PyResult<Table> {
-        Table::of(self.complete(py, ReadTable::default())?)
+        Table::of(self.complete(py, self.linked.table())?.to_vec())
     }
 
     /// Gives the probe a `Table`, which it keeps and uses from now on.
     fn write_table(&self, py: Python<'_>, table: &Table) -> PyResult<()> {
         let push = PushTable::new(&table.bytes).map_err(|why| why.raise())?;
-        self.complete(py, push)
+        self.get(py, push)
     }
 
     /// Says how far an arm is with an order, while something is under way: see `Rig`.
     fn _tell_arm(&self, number: u16, state: &Bound<'_, PyAny>) -> PyResult<()> {
         let state: ArmState = state_of(state)?;
         let report = ArmReport { number, state };
-        let mut outgoing = self.outgoing.lock().unwrap_or_else(PoisonError::into_inner);
-        outgoing.push(Command::Arm(report));
-        Ok(())
+        // whoever reads the port sends it
+        let sent = self.linked.send(Command::Arm(report));
+        sent.map_err(|why| why.raise())
     }
 
     /// Whether the probe sends raw samples (events `Block` and `Pdc`) from now on.
     fn stream(&self, py: Python<'_>, on: bool) -> PyResult<()> {
-        self.complete(py, Request::command(Command::Stream(on)))
+        self.get(py, Request::command(Command::Stream(on)))
     }
 
     /// Has the rig find its limit switches: an iterator of events.
@@ -402,46 +412,43 @@ impl Probe {
 
     /// Tells the probe which texture it explored last: it learns from those slides.
     fn teach(&self, py: Python<'_>, name: &str) -> PyResult<u8> {
-        Ok(self.complete(py, Request::label(name_of(name)?))?.slides)
+        Ok(self.get(py, Request::label(name_of(name)?))?.slides)
     }
 
     /// Records slides of what lies under the finger, movements of the probe's table in turn: a list of `Slide` of that texture. Slides
     /// that did not arrive whole are left out. Ctrl-C stops the rig and lifts the finger.
     #[pyo3(signature = (texture, *, slides=15, seed=None))]
     fn record(
-        slf: &Bound<'_, Self>,
+        &self,
+        py: Python<'_>,
         texture: &str,
         slides: u8,
         seed: Option<u32>,
     ) -> PyResult<Vec<Slide>> {
-        let (probe, py) = (slf.get(), slf.py());
-        let calibration = probe.complete(py, Request::read_calibration())?;
-        probe.stream(py, true)?;
-        let wanted = Recorder::wanted(0, slides, seed.unwrap_or_else(seed_of_now));
-        Self::begin(slf, Command::Identify(wanted))?;
-        let (mut recorder, mut made) = (Recorder::new(calibration.pressure), Vec::new());
-        while let Some(report) = probe.next(py)? {
-            if let Some(Ok(slide)) = recorder.hear(0, &report) {
-                made.push(Slide::new(slide, texture));
-            }
-        }
-        probe.stream(py, false)?;
-        Ok(made)
+        let wanted = Wanted {
+            name: texture,
+            index: 0,
+            slides,
+            sample: Sample::Told(None),
+            seed: seed.unwrap_or_else(seed_of_now),
+        };
+        let recorded = self.complete(py, record(&self.linked, &wanted))?;
+        let slides = recorded.slides.into_iter();
+        Ok(slides
+            .map(|(slide, _)| Slide::new(slide, texture))
+            .collect())
     }
 
     /// Stops what is under way and lifts the finger.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.with(py, Inner::stop)?;
-        self.complete(py, Request::command(Command::Stop))
+        self.complete(py, operations::stop(&self.linked))
     }
 
     /// Frames that were damaged, and reports that were lost on the line so far.
     #[getter]
-    fn losses(&self, py: Python<'_>) -> PyResult<(u64, u64)> {
-        self.with(py, |inner| {
-            let session = inner.port.session();
-            Ok((session.damaged(), session.missing()))
-        })
+    fn losses(&self) -> (u64, u64) {
+        self.linked.losses()
     }
 
     /// Stops what is under way, and gives the port back.

@@ -1,4 +1,4 @@
-//! What carries bytes to the probe: serial ports and TCP ports, by the names that `--port` takes.
+//! Carriers of bytes to the probe: serial ports and TCP ports, by the names that `--port` takes.
 
 use std::fmt;
 use std::io::{self, Read, Write};
@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
 
-use super::owner::{Owned, Owner};
+use super::lock::{PortInUse, PortLock};
 
 /// The probe's line.
 const BAUD: u32 = 921_600;
@@ -27,14 +27,14 @@ pub enum LineError {
     None,
     /// More than one.
     #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
-    Several(Vec<Found>),
+    Several(Vec<PortInfo>),
     /// No such port.
     #[error("{port}: there is no such port. {}", others(.found))]
     NotThere {
         /// Its name.
         port: String,
         /// Those that there are.
-        found: Vec<Found>,
+        found: Vec<PortInfo>,
     },
     /// Another program has it.
     #[error(
@@ -44,7 +44,7 @@ pub enum LineError {
     Busy(String),
     /// Another tactus has it.
     #[error(transparent)]
-    Owned(#[from] Owned),
+    InUse(#[from] PortInUse),
     /// The user may not.
     #[error(
         "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
@@ -72,21 +72,21 @@ pub enum LineError {
 
 /// A serial port of this PC.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Found {
+pub struct PortInfo {
     /// Its name.
     pub name: String,
     /// What the USB device says of itself, if it is one.
     pub usb: Option<UsbPortInfo>,
 }
 
-impl Found {
+impl PortInfo {
     /// Whether it is an ST-LINK, as a NUCLEO has.
     pub fn is_nucleo(&self) -> bool {
         self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
     }
 }
 
-impl From<SerialPortInfo> for Found {
+impl From<SerialPortInfo> for PortInfo {
     fn from(port: SerialPortInfo) -> Self {
         let usb = match port.port_type {
             SerialPortType::UsbPort(usb) => Some(usb),
@@ -99,7 +99,7 @@ impl From<SerialPortInfo> for Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for PortInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<16}", self.name)?;
         let Some(usb) = &self.usb else {
@@ -118,12 +118,12 @@ impl fmt::Display for Found {
 }
 
 /// A line for each.
-pub fn lines(ports: &[Found]) -> String {
+pub fn lines(ports: &[PortInfo]) -> String {
     let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
     lines.join("\n")
 }
 
-fn others(found: &[Found]) -> String {
+fn others(found: &[PortInfo]) -> String {
     if found.is_empty() {
         "This PC has no serial port now: plug in the board's USB socket CN1, or try --emulated"
             .to_owned()
@@ -133,11 +133,11 @@ fn others(found: &[Found]) -> String {
 }
 
 /// The serial ports of this PC; boards first. Those of the mainboard that no chip answers at are left out.
-pub fn found() -> Vec<Found> {
+pub fn found() -> Vec<PortInfo> {
     let ports = serialport::available_ports().unwrap_or_default();
-    let mut ports: Vec<Found> = ports
+    let mut ports: Vec<PortInfo> = ports
         .into_iter()
-        .map(Found::from)
+        .map(PortInfo::from)
         // every Linux has 32 of these, there or not
         .filter(|port| port.usb.is_some() || !port.name.starts_with("/dev/ttyS"))
         .collect();
@@ -153,24 +153,24 @@ impl<T: Read + Write + Send> Line for T {}
 ///
 /// # Errors
 /// See [`LineError`].
-pub fn open(name: &str) -> Result<(Box<dyn Line>, Owner), LineError> {
+pub fn open(name: &str) -> Result<(Box<dyn Line>, PortLock), LineError> {
     // however its address was written
     let same = tcp_address(name).map(|address| format!("tcp:{address}"));
-    let owner = Owner::take(same.as_deref().unwrap_or(name))?;
+    let lock = PortLock::take(same.as_deref().unwrap_or(name))?;
     let line = match tcp_address(name) {
         Some(address) => tcp(address)?,
         None => serial(name)?,
     };
     tracing::info!(port = name, "opens");
-    Ok((line, owner))
+    Ok((line, lock))
 }
 
 /// The only NUCLEO among these.
 ///
 /// # Errors
 /// There is none, or there are several.
-pub fn only_nucleo(found: Vec<Found>) -> Result<String, LineError> {
-    let mut nucleos: Vec<Found> = found.into_iter().filter(Found::is_nucleo).collect();
+pub fn only_nucleo(found: Vec<PortInfo>) -> Result<String, LineError> {
+    let mut nucleos: Vec<PortInfo> = found.into_iter().filter(PortInfo::is_nucleo).collect();
     match nucleos.len() {
         0 => Err(LineError::None),
         1 => Ok(nucleos.remove(0).name),
@@ -230,7 +230,7 @@ pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
 mod tests {
     use super::*;
 
-    fn port(name: &str, vid: u16) -> Found {
+    fn port(name: &str, vid: u16) -> PortInfo {
         let usb = UsbPortInfo {
             vid,
             pid: 0x374b,
@@ -238,7 +238,7 @@ mod tests {
             manufacturer: None,
             product: Some("STM32 STLink".into()),
         };
-        Found {
+        PortInfo {
             name: name.into(),
             usb: Some(usb),
         }
@@ -287,7 +287,7 @@ mod tests {
             port("/dev/ttyACM0", ST).to_string(),
             "/dev/ttyACM0      0483:374b  STM32 STLink  066EFF  <- a NUCLEO: try this one"
         );
-        let plain = Found {
+        let plain = PortInfo {
             name: "/dev/ttyAMA0".into(),
             usb: None,
         };

@@ -321,7 +321,7 @@ fn requests_get_their_answers() {
         undisturbed,
     );
     let found = found.unwrap().unwrap();
-    let Found { verdict, learned } = found;
+    let Identified { verdict, learned } = found;
     assert_eq!((verdict.name.as_str(), verdict.slides), ("velcro", 3));
     assert_eq!((learned, verdict.log_odds), (3, Some(-7.5)));
     let named = |name| Request::label(Name::try_from(name).unwrap());
@@ -504,13 +504,23 @@ fn a_port_runs_transactions() {
         answer: VecDeque::new(),
         silent: false,
     };
-    let mut port = Port::new(line, Duration::from_millis(50));
-    port.run(PushTable::new(&bytes).unwrap(), |_| ()).unwrap();
-    assert_eq!(port.run(ReadTable::default(), |_| ()).unwrap(), bytes);
-    assert_eq!(port.session().damaged(), 0);
+    let time = Duration::from_millis(50);
+    let probe = super::Probe::new("here", time, time);
+    let mut port = Port::new(line, probe.clone());
+    let push = PushTable::new(&bytes).unwrap();
+    port.run(probe.get(push)).unwrap();
+    assert_eq!(*port.run(probe.table()).unwrap(), *bytes);
+    assert_eq!(probe.losses(), (0, 0));
     port.stream.silent = true;
-    let silent = port.run(ReadTable::default(), |_| ()).unwrap_err();
-    assert!(matches!(silent, PortError::Silent(_)), "{silent}");
+    // pulled once, and known from then on
+    assert_eq!(*port.run(probe.table()).unwrap(), *bytes);
+    let silent = port.run(probe.get(ReadTable::default())).unwrap_err();
+    assert!(
+        silent
+            .to_string()
+            .starts_with("here: the probe said nothing for"),
+        "{silent}"
+    );
 }
 
 /// What a line may do to a stretch of bytes.
@@ -537,16 +547,15 @@ impl Write for Noise {
 #[test]
 fn bytes_without_end_are_no_answer() {
     for request in [Command::Stop, Command::Home].map(Request::command) {
-        let mut port = Port::new(Noise, Duration::from_millis(1));
-        let mut job = port.begin(request).unwrap();
+        let time = Duration::from_millis(1);
+        let probe = super::Probe::new("here", time, time);
+        let mut port = Port::new(Noise, probe.clone());
         let began = Instant::now();
-        let why = loop {
-            assert!(began.elapsed() < Duration::from_secs(10));
-            if let Err(why) = port.step(&mut job, |_| {}) {
-                break why;
-            }
-        };
-        assert!(matches!(why, PortError::Garbage(1..)), "{why}");
+        let why = port.run(probe.get(request)).unwrap_err();
+        assert!(began.elapsed() < Duration::from_secs(10));
+        let is_garbage = |why: &PortError| matches!(why, PortError::Garbage(1..));
+        let garbage = matches!(&why, OperationError::Port { why, .. } if is_garbage(why));
+        assert!(garbage, "{why}");
     }
 }
 

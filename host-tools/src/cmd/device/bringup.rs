@@ -10,7 +10,7 @@ use tactus::bringup::{
     self, Board, Ended, Ends, Entry, Image, Journal, Line, Owner, Person, Probe, Report, STEPS,
     Step, Trouble, judge,
 };
-use tactus::link::{LinkError, PortError, Request};
+use tactus::link::Request;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as Told, Reset};
 
@@ -79,7 +79,7 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         lines: lines(),
     };
     let done = if bringup::next_image(&journal) == Some(Image::Rig) {
-        let (bench, _) = Bench::open(&place)?;
+        let (bench, _) = Bench::open(&place, Format::Text)?;
         let mut linked = Linked(bench);
         bringup::run(Ends::Rig(&mut linked), &mut person, &mut journal)
     } else {
@@ -129,16 +129,16 @@ impl Probe for Linked {
         command: Command,
         each: &mut dyn FnMut(&Told),
     ) -> Result<Result<(), String>, Trouble> {
-        let done = self.0.run(Request::command(command), |report| {
+        let probe = self.0.probe();
+        let done = probe.run(Request::command(command), |report| {
             each(report);
             Ok(())
         });
-        match done {
+        match self.0.done(done, &mut io::sink()) {
             Ok(()) => Ok(Ok(())),
-            Err(BenchError::Port {
-                why: PortError::Link(LinkError::Refused(why)),
-                ..
-            }) => Ok(Err(why.to_string())),
+            Err(BenchError::Operation(why)) if why.refusal().is_some() => {
+                Ok(Err(why.refusal().unwrap_or_default()))
+            }
             Err(why) if why.is_interrupt() => Err(Trouble::Quit),
             Err(why) => Err(io::Error::other(why.to_string()).into()),
         }

@@ -1,7 +1,7 @@
 //! What the keys of the monitor do.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
-use tactus::remote::say::name_of;
+use tactus::link::say::name_of;
 use tactus_core::table::Name;
 
 use super::state::{Monitor, Weight};

@@ -10,7 +10,7 @@ use ratatui::widgets::{
     Axis, Block, BorderType, Chart, Clear, Dataset, GraphType, Paragraph, Sparkline,
 };
 use tactus::eval::show::count;
-use tactus::remote::say::phase_name;
+use tactus::link::say::phase_name;
 use tactus_core::dsp::{BIN_HZ, Plain, SpectrumSum, angles};
 use tactus_core::features::Property;
 use tactus_core::wire::Phase;
