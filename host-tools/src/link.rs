@@ -5,7 +5,7 @@
 //! [`Probe`] runs jobs over bytes that somebody else carries, for [`operations`] that follow each other; [`Port`] carries its bytes
 //! over anything that reads and writes: a serial line, a TCP connection.
 
-pub mod exchange;
+mod error;
 pub mod follow;
 pub mod lifting;
 #[cfg(feature = "serial")]
@@ -14,6 +14,7 @@ pub mod line;
 pub mod lock;
 pub mod log;
 pub mod operations;
+pub mod person;
 mod port;
 pub mod probe;
 mod request;
@@ -23,9 +24,9 @@ mod session;
 mod table;
 mod transaction;
 
-pub use exchange::{Exchange, PortError};
+pub use error::{OperationError, PortError};
 pub use port::Port;
-pub use probe::{OperationError, Probe};
+pub use probe::Probe;
 pub use request::{Identified, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
 pub use table::{PushTable, ReadTable};

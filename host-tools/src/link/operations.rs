@@ -8,14 +8,17 @@ use std::io::{self, Write as _};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use serde::Serialize;
 use tactus_core::probe::training::pilot_movements;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::most_mn;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{self, Command, Event, Identify, Report, Status};
 
+use super::error::OperationError;
 use super::lifting::Stopped;
-use super::probe::{OperationError, Probe, Question, QuestionKind};
+use super::person::{Question, QuestionKind};
+use super::probe::Probe;
 use super::request::{Identified, Request};
 use super::samples::{Noting, Trials, fewest, noting};
 use super::say;
@@ -28,9 +31,6 @@ pub use tables::{set_false_alarm, set_high_force, settings};
 type Result<T> = std::result::Result<T, OperationError>;
 
 /// Shows how a probe is, once it has come up.
-///
-/// # Errors
-/// See [`OperationError`], as of all others here.
 pub async fn status(probe: &Probe) -> Result<(Status, RigCalibration)> {
     let status = probe.hello().await?;
     let calibration = probe.get(Request::read_calibration()).await?;
@@ -40,9 +40,6 @@ pub async fn status(probe: &Probe) -> Result<(Status, RigCalibration)> {
 }
 
 /// Ends a fault, and has the rig find its limit switches.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn home(probe: &Probe) -> Result<()> {
     probe.perform(Request::command(Command::Home)).await?;
     writeln!(
@@ -53,9 +50,6 @@ pub async fn home(probe: &Probe) -> Result<()> {
 }
 
 /// Stops whatever is done, and waits until the finger is lifted and the stage stands.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn stop(probe: &Probe) -> Result<()> {
     match probe.lift().await? {
         Stopped::Lifted => {}
@@ -69,9 +63,6 @@ pub async fn stop(probe: &Probe) -> Result<()> {
 }
 
 /// Has the probe explore, and stream its samples meanwhile: with them every slide can be measured again from a log.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn identify(
     probe: &Probe,
     wanted: Identify,
@@ -85,10 +76,10 @@ pub async fn identify(
 }
 
 /// A texture that the probe has learned.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Learned {
     /// Its name.
-    pub name: Name,
+    pub name: String,
     /// The probe did not know it before.
     pub is_new: bool,
     /// Slides that were made for it, or that it was taught from.
@@ -96,34 +87,33 @@ pub struct Learned {
     /// Its sample was moved or turned between trials, as the table says it.
     pub sample_moved: Option<bool>,
     /// Why the table does not say so, in a sentence.
+    #[serde(skip)]
     pub not_noted: Option<String>,
     /// The table in use now.
+    #[serde(skip)]
     pub table: Arc<[u8]>,
 }
 
 /// Names the texture of the last exploration; the probe learns it.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn teach(probe: &Probe, name: Name) -> Result<Learned> {
     let before = probe.table().await?;
     let taught = probe.get(Request::label(name)).await?;
     let slides = say::count(taught.slides, "slide");
     let name = taught.name;
     writeln!(probe.words(), "The probe has learned {name} from {slides}.")?;
-    learned(probe, name, taught.slides.into(), &before).await
+    learned(probe, &name, taught.slides.into(), &before).await
 }
 
-async fn learned(probe: &Probe, name: Name, slides: u32, before: &[u8]) -> Result<Learned> {
+async fn learned(probe: &Probe, name: &str, slides: u32, before: &[u8]) -> Result<Learned> {
     let table = probe.table().await?;
     let read = Table::read(&table)?;
-    let texture = read.find(&name);
+    let texture = read.find(name);
     Ok(Learned {
-        is_new: Table::read(before)?.find(&name).is_none(),
+        is_new: Table::read(before)?.find(name).is_none(),
         slides,
         sample_moved: texture.and_then(|texture| read.moved(texture)),
         not_noted: None,
-        name,
+        name: name.to_string(),
         table,
     })
 }
@@ -153,9 +143,6 @@ pub struct Training {
 }
 
 /// Has somebody move the sample before the next trial; true if it was moved.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn ask_to_move(probe: &Probe, name: &str) -> Result<bool> {
     let question = Question {
         said: String::new(),
@@ -166,9 +153,6 @@ pub async fn ask_to_move(probe: &Probe, name: &str) -> Result<bool> {
 }
 
 /// Has somebody lay a sample under the finger.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn ask_to_lay(probe: &Probe, name: &str, kind: QuestionKind) -> Result<bool> {
     let question = Question {
         said: String::new(),
@@ -179,9 +163,6 @@ pub async fn ask_to_lay(probe: &Probe, name: &str, kind: QuestionKind) -> Result
 }
 
 /// Has the probe make slides of a texture and learn it.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn train(probe: &Probe, training: &Training) -> Result<Learned> {
     let Training { name, trials, .. } = training;
     let before = probe.table().await?;
@@ -246,7 +227,7 @@ pub async fn train(probe: &Probe, training: &Training) -> Result<Learned> {
     }
     let learned = Learned {
         not_noted,
-        ..learned(probe, name.clone(), slides, &before).await?
+        ..learned(probe, name, slides, &before).await?
     };
     if slides > 0 && !training.pilot {
         writeln!(words, "{}", say::of_sample(learned.sample_moved))?;

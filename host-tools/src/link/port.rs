@@ -5,7 +5,7 @@ use std::pin::{Pin, pin};
 use std::task::{Context, Poll, Waker};
 use std::time::Instant;
 
-use super::exchange::PortError;
+use super::error::PortError;
 use super::probe::Probe;
 
 /// A carrier of a probe's bytes. Reads of its stream must return within a fraction of the timeout, with

@@ -5,150 +5,49 @@
 //! ([`said`](Probe::said)) and files, and answers the questions.
 
 use std::future::poll_fn;
-use std::io::{self, Write};
+use std::io;
 use std::mem::take;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Poll;
 use std::time::Duration;
 
-use tactus_core::table::{Table, TableError};
-use tactus_core::wire::{Command, Event, Report, Status};
+use tactus_core::table::Table;
+use tactus_core::wire::{Command, Event, Phase, Report, Status};
 
-use super::exchange::{BOOTING, Exchange, PortError, is_up};
+use super::error::{OperationError, PortError};
 use super::lifting::{Lifting, RigWatch, Stopped, moves};
 use super::log::Line;
+use super::person::{Backup, Question, Words};
 use super::request::Request;
 use super::say::Prompts;
-use super::session::LinkError;
+use super::session::{LinkError, MAX_TRIES, Session};
 use super::table::ReadTable;
 use super::transaction::{Job, Transaction};
 
+/// A probe that says nothing for so long is taken for gone: its longest silence is an erase of its flash, 2 s.
+pub const TIMEOUT: Duration = Duration::from_secs(5);
+/// A first answer comes sooner: the probe reports its status at once.
+pub const GREETING: Duration = Duration::from_secs(1);
+/// A probe opens its store within 10 s of its start.
+const BOOTING: Duration = Duration::from_secs(90);
 /// Time between two questions to a probe that boots.
 const BETWEEN: Duration = Duration::from_millis(100);
-
-/// Why an operation failed, and what to do.
-#[derive(Debug, thiserror::Error)]
-pub enum OperationError {
-    /// The line failed, or the probe refused.
-    #[error("{name}: {why}{}", after(.why, *.moving))]
-    Port {
-        /// Name of the line.
-        name: String,
-        /// The cause.
-        why: PortError,
-        /// Something that moves was asked for and not over.
-        moving: bool,
-    },
-    /// The user stopped it.
-    #[error(transparent)]
-    Stopped(#[from] Stopped),
-    /// The probe's table is damaged.
-    #[error("the probe's table cannot be read: {0}")]
-    Table(#[from] TableError),
-    /// A file does not hold a table for the probe.
-    #[error("{file}")]
-    File {
-        /// Name of the file.
-        file: String,
-        /// The cause.
-        source: LinkError,
-    },
-    /// The host has nothing that the probe could take.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// Something cannot be written.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// A sentence.
-    #[error("{0}")]
-    Said(String),
-}
-
-impl OperationError {
-    /// An error with the sentence of another one.
-    pub fn said(why: impl ToString) -> Self {
-        Self::Said(why.to_string())
-    }
-
-    /// The probe's reason, where it refused.
-    pub fn refusal(&self) -> Option<String> {
-        match self {
-            Self::Port {
-                why: PortError::Link(LinkError::Refused(why)),
-                ..
-            } => Some(why.to_string()),
-            _ => None,
-        }
-    }
-}
-
-/// What follows a failure of the line, while something moved.
-fn after(why: &PortError, moving: bool) -> &'static str {
-    if moving && !matches!(why, PortError::Link(_)) {
-        ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its emergency stop"
-    } else {
-        ""
-    }
-}
-
-/// A question that has to be answered before an operation goes on.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Question {
-    /// What has to be known for it; may be empty.
-    pub said: String,
-    /// The question, or what somebody is to do.
-    pub asked: String,
-    /// What yes and no mean.
-    pub kind: QuestionKind,
-}
-
-/// The meaning of yes and no.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum QuestionKind {
-    /// Go on; else nothing is changed.
-    Consent,
-    /// The sample was moved; else it stays.
-    Moved,
-    /// The sample lies under the finger.
-    Laid,
-    /// The sample lies under the finger; else it is left out.
-    LaidOrLeftOut,
-}
-
-/// A file that has to be kept before an operation goes on.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Backup {
-    /// Its name.
-    pub name: String,
-    /// Its contents.
-    pub bytes: Vec<u8>,
-}
-
-/// The words of an operation for people.
-#[derive(Clone, Default, Debug)]
-pub struct Words(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Words {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        words.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
 
 #[derive(Debug)]
 struct State {
     name: String,
-    exchange: Exchange,
-    /// silence that a probe which has answered is allowed
+    session: Session,
+    /// silence that is allowed, and that of a probe which has answered
+    greeting: Duration,
     timeout: Duration,
+    send: Vec<u8>,
     received: Vec<u8>,
+    /// bytes and reports that came
+    came: (u64, u64),
     now: Duration,
+    /// when a report came last, or was waited for from then on
+    heard: Duration,
     closed: bool,
     /// why the line is closed, until somebody was told
     failure: Option<PortError>,
@@ -219,8 +118,9 @@ impl State {
     }
 
     fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, OperationError> {
-        let begun = self.exchange.begin(transaction, self.now);
-        let job = begun.map_err(|why| self.error(why, false))?;
+        self.heard = self.now;
+        let begun = Job::begin(transaction, &mut self.session, &mut self.send);
+        let job = begun.map_err(|why| self.error(why.into(), false))?;
         if let Some(command) = job.command() {
             self.asks(&command.clone());
         }
@@ -229,8 +129,19 @@ impl State {
 
     fn send(&mut self, command: Command) -> Result<(), OperationError> {
         self.asks(&command);
-        let sent = self.exchange.send(command);
-        sent.map_err(|why| self.error(why, false))
+        let sent = self.session.request(command, &mut self.send);
+        sent.map_err(|why| self.error(LinkError::from(why).into(), false))?;
+        Ok(())
+    }
+
+    /// Takes in what came while no job is under way.
+    fn listen(&mut self) -> Vec<Report> {
+        let received = take(&mut self.received);
+        let reports = self.session.receive(&received);
+        self.came.0 += received.len() as u64;
+        self.came.1 += reports.len() as u64;
+        self.hear(&reports);
+        reports
     }
 
     /// Continues a job with what came; the reports that came are pushed.
@@ -244,17 +155,53 @@ impl State {
             self.rig.moves(job.last_id());
         }
         self.open(moving)?;
-        let received = take(&mut self.received);
-        let each = |report: &Report| reports.push(report.clone());
-        let polled = self.exchange.step(job, &received, self.now, each);
+        let polled = self.poll(job, reports);
         self.hear(reports);
         polled.map_err(|why| {
             if moving && !matches!(why, PortError::Link(LinkError::Refused(_))) {
                 // there may be nobody to hear it
-                let _ = self.exchange.send(Command::Stop);
+                let _ = self.session.request(Command::Stop, &mut self.send);
             }
             self.error(why, moving)
         })
+    }
+
+    fn poll<E: Transaction>(
+        &mut self,
+        job: &mut Job<E>,
+        reports: &mut Vec<Report>,
+    ) -> Result<Poll<E::Outcome>, PortError> {
+        let received = take(&mut self.received);
+        if !received.is_empty() {
+            self.came.0 += received.len() as u64;
+            let each = |report: &Report| reports.push(report.clone());
+            let polled = job.poll(&mut self.session, &received, &mut self.send, each);
+            self.came.1 += reports.len() as u64;
+            match polled {
+                Poll::Ready(Err(LinkError::Disturbed)) if self.came.1 == 0 => {
+                    return Err(PortError::Garbage(self.came.0));
+                }
+                Poll::Ready(outcome) => return Ok(Poll::Ready(outcome?)),
+                // bytes without end that are no report are as good as silence
+                Poll::Pending if !reports.is_empty() => self.heard = self.now,
+                Poll::Pending => {}
+            }
+        }
+        if self.now.saturating_sub(self.heard) >= self.greeting {
+            let garbage = self.came.0 > 0 && self.came.1 == 0;
+            match job.repeat(&mut self.session, &mut self.send) {
+                Ok(true) => self.heard = self.now,
+                Ok(false) | Err(LinkError::Disturbed) if garbage => {
+                    return Err(PortError::Garbage(self.came.0));
+                }
+                Ok(false) => return Err(PortError::Silent(self.greeting)),
+                Err(LinkError::Disturbed) => {
+                    return Err(PortError::Silent(self.greeting * MAX_TRIES.into()));
+                }
+                Err(why) => return Err(why.into()),
+            }
+        }
+        Ok(Poll::Pending)
     }
 }
 
@@ -271,10 +218,14 @@ impl Probe {
     pub fn new(name: &str, greeting: Duration, timeout: Duration) -> Self {
         let state = State {
             name: name.to_owned(),
-            exchange: Exchange::new(greeting),
+            session: Session::default(),
+            greeting,
             timeout,
+            send: Vec::new(),
             received: Vec::new(),
+            came: (0, 0),
             now: Duration::ZERO,
+            heard: Duration::ZERO,
             closed: false,
             failure: None,
             rig: RigWatch::default(),
@@ -309,7 +260,7 @@ impl Probe {
 
     /// What is to be sent now.
     pub fn to_send(&self) -> Vec<u8> {
-        self.state().exchange.to_send()
+        take(&mut self.state().send)
     }
 
     /// The line is gone.
@@ -371,8 +322,7 @@ impl Probe {
 
     /// Words since the last time.
     pub fn take_words(&self) -> Vec<u8> {
-        let mut words = self.words.0.lock().unwrap_or_else(PoisonError::into_inner);
-        take(&mut *words)
+        self.words.take()
     }
 
     /// Name of the line.
@@ -383,8 +333,7 @@ impl Probe {
     /// Frames that were damaged, and reports that were lost on the line.
     pub fn losses(&self) -> (u64, u64) {
         let state = self.state();
-        let session = state.exchange.session();
-        (session.damaged(), session.missing())
+        (state.session.damaged(), state.session.missing())
     }
 
     // ---- for operations
@@ -400,31 +349,18 @@ impl Probe {
     }
 
     /// Takes in what came while nothing is asked for.
-    ///
-    /// # Errors
-    /// The line is gone.
     pub fn listen(&self) -> Result<Vec<Report>, OperationError> {
         let mut state = self.state();
         state.open(false)?;
-        let (received, mut reports) = (take(&mut state.received), Vec::new());
-        let each = |report: &Report| reports.push(report.clone());
-        state.exchange.listen(&received, each);
-        state.hear(&reports);
-        Ok(reports)
+        Ok(state.listen())
     }
 
     /// Sends a command beside whatever is under way.
-    ///
-    /// # Errors
-    /// It cannot be sent.
     pub fn send(&self, command: Command) -> Result<(), OperationError> {
         self.state().send(command)
     }
 
     /// Listens for so long.
-    ///
-    /// # Errors
-    /// The line is gone.
     pub async fn pause(&self, time: Duration) -> Result<(), OperationError> {
         let began = self.now();
         while self.now().saturating_sub(began) < time {
@@ -435,15 +371,13 @@ impl Probe {
     }
 
     /// The status of a probe that has come up: it may have had its power just now.
-    ///
-    /// # Errors
-    /// See [`OperationError`].
     pub async fn hello(&self) -> Result<Status, OperationError> {
         let began = self.now();
         let status = loop {
             let status = self.get(Request::status()).await;
             let up = match &status {
-                Ok(status) => is_up(status),
+                // one without a table has not opened its store yet
+                Ok(status) => status.textures > 0 && status.phase != Phase::Homing,
                 Err(OperationError::Port { why, .. }) => !why.is_restart(),
                 Err(_) => true,
             };
@@ -453,15 +387,11 @@ impl Probe {
             self.pause(BETWEEN).await?;
         };
         let mut state = self.state();
-        let timeout = state.timeout;
-        state.exchange.set_timeout(timeout);
+        state.greeting = state.timeout;
         Ok(status)
     }
 
     /// The table that the probe uses; it is pulled once for as long as the probe uses it.
-    ///
-    /// # Errors
-    /// See [`OperationError`].
     pub async fn table(&self) -> Result<Arc<[u8]>, OperationError> {
         if let Some((_, bytes)) = &self.state().table {
             return Ok(Arc::clone(bytes));
@@ -473,17 +403,11 @@ impl Probe {
     }
 
     /// Runs a transaction to its end, as [`run`](Self::run).
-    ///
-    /// # Errors
-    /// See [`OperationError`].
     pub async fn get<E: Transaction>(&self, transaction: E) -> Result<E::Outcome, OperationError> {
         self.run(transaction, |_| Ok(())).await
     }
 
     /// Runs a transaction that moves the rig, and says what a person is asked to do, faults and their recovery.
-    ///
-    /// # Errors
-    /// See [`OperationError`].
     pub async fn perform<E: Transaction>(
         &self,
         transaction: E,
@@ -494,9 +418,6 @@ impl Probe {
     }
 
     /// Runs a transaction to its end; `each` gets every report. Whatever ends it early leaves the rig stopped and lifted.
-    ///
-    /// # Errors
-    /// See [`OperationError`].
     pub async fn run<E: Transaction>(
         &self,
         transaction: E,
@@ -510,9 +431,6 @@ impl Probe {
 
     /// Runs a transaction as [`run`](Self::run) does, and `each` may break it off: `None` then, and the rig is stopped and
     /// lifted.
-    ///
-    /// # Errors
-    /// See [`OperationError`].
     pub async fn run_until<E: Transaction>(
         &self,
         transaction: E,
@@ -548,9 +466,6 @@ impl Probe {
     }
 
     /// Stops whatever is done, and waits until the finger is lifted and nothing moves.
-    ///
-    /// # Errors
-    /// The line is gone.
     pub async fn lift(&self) -> Result<Stopped, OperationError> {
         let mut lifting = {
             let state = &mut *self.state();
@@ -607,18 +522,12 @@ impl Probe {
     }
 
     /// Asks whoever is there, and waits for the answer.
-    ///
-    /// # Errors
-    /// The user stops it, or the line is gone.
     pub async fn ask(&self, question: Question) -> Result<bool, OperationError> {
         self.state().question = Some(question);
         self.wait(|state| state.answer.take()).await
     }
 
     /// Has a file kept; how it is brought back.
-    ///
-    /// # Errors
-    /// It cannot be kept.
     pub async fn keep(&self, backup: Backup) -> Result<String, OperationError> {
         self.state().backup = Some(backup);
         let kept = self.wait(|state| state.kept.take()).await?;

@@ -3,6 +3,7 @@
 
 use std::io::{self, Write as _};
 
+use serde::Serialize;
 use tactus_core::explorer::{Strategy, Verdict};
 use tactus_core::table::{Contents, Name, Table};
 use tactus_core::wire::{Command, Event, Identify, Report, Status};
@@ -20,7 +21,7 @@ use crate::eval::show::Show;
 use crate::eval::verified::{Verified, print_answer, print_slide};
 pub use crate::link::operations::Learned;
 use crate::link::operations::{self, Sample, Training, ask_to_lay, ask_to_move};
-use crate::link::probe::QuestionKind;
+use crate::link::person::QuestionKind;
 use crate::link::say::{Prompts, count, show_verifying};
 use crate::link::{Identified, OperationError, Probe, Request};
 
@@ -30,9 +31,6 @@ type Result<T> = std::result::Result<T, OperationError>;
 const NAMED: usize = 5;
 
 /// Has the probe explore, and shows every step; the verdict and after how many slides it came.
-///
-/// # Errors
-/// See [`OperationError`], as of all others here.
 pub async fn identify(
     probe: &Probe,
     wanted: Identify,
@@ -56,17 +54,11 @@ pub async fn identify(
 }
 
 /// Names the texture of the last exploration, and compares it with the others.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn teach(probe: &Probe, name: Name) -> Result<(Learned, Option<Alike>)> {
     compared(probe, operations::teach(probe, name).await?)
 }
 
 /// Has the probe make slides of a texture and learn it, and compares it with the others.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn train(probe: &Probe, training: &Training) -> Result<(Learned, Option<Alike>)> {
     compared(probe, operations::train(probe, training).await?)
 }
@@ -82,9 +74,6 @@ fn compared(probe: &Probe, learned: Learned) -> Result<(Learned, Option<Alike>)>
 }
 
 /// Has the probe find out whether what lies under its finger is this texture of its table.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn verify(probe: &Probe, texture: u16, wanted: Identify) -> Result<Verified> {
     let bytes = probe.table().await?;
     let wanted = Identify {
@@ -150,9 +139,6 @@ impl Recorded {
 }
 
 /// Has the probe make slides, movements of its table in turn, and records them.
-///
-/// # Errors
-/// See [`OperationError`]; also where no slide arrived whole.
 pub async fn record(probe: &Probe, wanted: &Wanted<'_>) -> Result<Recorded> {
     let Wanted { name, slides, .. } = *wanted;
     let calibration = probe.get(Request::read_calibration()).await?;
@@ -210,7 +196,7 @@ pub async fn record(probe: &Probe, wanted: &Wanted<'_>) -> Result<Recorded> {
 }
 
 /// The table of a probe after its skin or finger was replaced.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
 pub struct RefreshedProbe {
     /// Slides that it goes by.
     pub slides: usize,
@@ -222,14 +208,11 @@ pub struct RefreshedProbe {
     pub left_out: Vec<String>,
     /// Pairs that cannot be told apart now.
     pub alike: Vec<Pair>,
-    /// Checksum of the table in use.
-    pub crc: u32,
+    /// Checksum of the table in use; CRC-32, hexadecimal.
+    pub checksum: String,
 }
 
 /// Has the probe slide over every texture once at each movement, and moves its table, with somebody's consent.
-///
-/// # Errors
-/// See [`OperationError`]; also where the table has no whitened features.
 pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedProbe> {
     let bytes = probe.table().await?;
     let table = Table::read(&bytes)?;
@@ -258,12 +241,12 @@ pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedP
         moved,
         left_out,
         alike,
-        crc: 0,
+        checksum: String::new(),
     };
     refreshed.print(&mut words)?;
     let lost = "The probe is to use the table that has moved.";
     let status = operations::replace_table(probe, &new, lost, "refresh again").await?;
-    refreshed.crc = status.table_crc;
+    refreshed.checksum = format!("{:08x}", status.table_crc);
     Ok(refreshed)
 }
 

@@ -18,9 +18,9 @@ use super::open::open;
 use super::recorded::{Opened, Recorded};
 use super::replay::Replay;
 use super::work::{Kept, work};
-use crate::link::exchange::{GREETING, TIMEOUT};
 use crate::link::log::Line;
-use crate::link::probe::QuestionKind;
+use crate::link::person::{self, QuestionKind};
+use crate::link::probe::{GREETING, TIMEOUT};
 use crate::link::{OperationError, PortError, Probe};
 use crate::live::sentence;
 
@@ -278,8 +278,8 @@ async fn live(probe: Probe, desk: Rc<RefCell<Desk>>, kept: Rc<RefCell<Kept>>) {
     std::future::pending().await
 }
 
-impl From<crate::link::probe::Question> for Question {
-    fn from(question: crate::link::probe::Question) -> Self {
+impl From<person::Question> for Question {
+    fn from(question: person::Question) -> Self {
         let (said, asked) = (question.said, question.asked);
         let [yes, no] = match question.kind {
             QuestionKind::Consent => ["Yes", "No"],

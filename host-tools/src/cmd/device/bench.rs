@@ -11,12 +11,12 @@ use std::task::Poll;
 use std::time::Duration;
 
 use tactus::bringup::Trouble;
-use tactus::link::exchange::{GREETING, TIMEOUT};
 use tactus::link::lifting::Stopped;
 use tactus::link::line::Line;
 use tactus::link::lock::PortLock;
 use tactus::link::log;
-use tactus::link::probe::{Question, QuestionKind};
+use tactus::link::person::{Question, QuestionKind};
+use tactus::link::probe::{GREETING, TIMEOUT};
 use tactus::link::{OperationError, Port, Probe, Transaction};
 use tactus_core::wire::{Event, Report, Status};
 

@@ -8,7 +8,7 @@ use tactus::data::recording::{Labels, Texture};
 use tactus::data::recordings::RecordingWriter;
 use tactus::eval::show::count;
 use tactus::link::operations::ask_to_lay;
-use tactus::link::probe::QuestionKind;
+use tactus::link::person::QuestionKind;
 use tactus::remote::operations::{self, Wanted};
 
 use super::bench::Bench;

@@ -3,8 +3,7 @@
 use std::io::Write;
 
 use serde::Serialize;
-use tactus::eval::refresh::{Moved, Pair};
-use tactus::remote::operations;
+use tactus::remote::operations::{self, RefreshedProbe};
 
 use super::bench::Bench;
 use super::line::Where;
@@ -34,22 +33,12 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// What `device refresh --format json` prints.
+/// The object that `device refresh --format json` prints.
 #[derive(Serialize)]
 struct Summary {
-    /// Slides that it goes by.
-    slides: usize,
-    /// How far all textures moved together, standard deviations of a slide.
-    together: f64,
-    /// How far each moved beyond that.
-    moved: Vec<Moved>,
-    /// Textures without a new slide.
-    left_out: Vec<String>,
-    /// Pairs that cannot be told apart now.
-    alike: Vec<Pair>,
+    #[serde(flatten)]
+    refreshed: RefreshedProbe,
     backup: Option<String>,
-    /// Of the table that the probe uses now; CRC-32, hexadecimal.
-    checksum: String,
 }
 
 /// Has the probe slide over every texture, and moves its table.
@@ -67,14 +56,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     for moved in &mut refreshed.moved {
         moved.moved = rounded(moved.moved);
     }
-    let summary = Summary {
-        slides: refreshed.slides,
-        together: rounded(refreshed.together),
-        moved: refreshed.moved,
-        left_out: refreshed.left_out,
-        alike: refreshed.alike,
-        backup: bench.backup(),
-        checksum: format!("{:08x}", refreshed.crc),
-    };
-    print_json(&summary, out)
+    refreshed.together = rounded(refreshed.together);
+    let backup = bench.backup();
+    print_json(&Summary { refreshed, backup }, out)
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use tactus::eval::alike::Alike;
 use tactus::link::operations::Training;
 use tactus::link::say::{name_of, not_noted};
-use tactus::remote::operations;
+use tactus::remote::operations::{self, Learned};
 use tactus_core::table::{Name, Table};
 
 use super::bench::Bench;
@@ -62,17 +62,12 @@ pub(crate) struct Teach {
     format: Format,
 }
 
-/// What `device train` and `device teach` print with `--format json`.
+/// The object that `device train` and `device teach` print with `--format json`.
 #[derive(Serialize)]
-struct Learned {
-    name: String,
-    /// Whether the probe did not know it before.
-    is_new: bool,
-    /// Slides that were made for it, or that it was taught from.
-    slides: u32,
-    /// Whether its sample was moved or turned between trials, as the table says it.
-    sample_moved: Option<bool>,
-    /// What it feels most like; `null` where the probe knows no other, and after a pilot.
+struct Summary {
+    #[serde(flatten)]
+    learned: Learned,
+    /// The texture that it feels most like; `null` where the probe knows no other, and after a pilot.
     nearest: Option<Alike>,
 }
 
@@ -89,7 +84,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     };
     let probe = bench.probe();
     let learned = bench.done(operations::train(&probe, &training), out)?;
-    Learned::print(learned, args.format, out)
+    print(learned, args.format, out)
 }
 
 /// Names the texture of the last exploration.
@@ -102,30 +97,21 @@ pub(crate) fn teach(
     let name = known_as(typed, &bench.table()?)?;
     let probe = bench.probe();
     let learned = bench.done(operations::teach(&probe, name), out)?;
-    Learned::print(learned, *format, out)
+    print(learned, *format, out)
 }
 
-impl Learned {
-    fn print(
-        (learned, nearest): (operations::Learned, Option<Alike>),
-        format: Format,
-        out: &mut impl Write,
-    ) -> anyhow::Result<()> {
-        if format == Format::Text {
-            return Ok(());
-        }
-        if let Some(why) = &learned.not_noted {
-            eprintln!("{}", not_noted(why));
-        }
-        let learned = Self {
-            name: learned.name.to_string(),
-            is_new: learned.is_new,
-            slides: learned.slides,
-            sample_moved: learned.sample_moved,
-            nearest,
-        };
-        print_json(&learned, out)
+fn print(
+    (learned, nearest): (Learned, Option<Alike>),
+    format: Format,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    if format == Format::Text {
+        return Ok(());
     }
+    if let Some(why) = &learned.not_noted {
+        eprintln!("{}", not_noted(why));
+    }
+    print_json(&Summary { learned, nearest }, out)
 }
 
 /// The probe's name for a texture whose capitals were typed otherwise; any other stays as it is.

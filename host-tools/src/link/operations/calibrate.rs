@@ -9,9 +9,9 @@ use tactus_core::sensor::{FingerCode, FingerName, PressureSensor as _};
 use tactus_core::wire::Command;
 
 use super::Result;
-use crate::link::probe::{OperationError, Probe};
 use crate::link::request::Request;
 use crate::link::say;
+use crate::link::{OperationError, Probe};
 
 /// A calibration: what is measured by the probe, and what was measured otherwise.
 #[derive(Clone, Default, Debug)]
@@ -29,9 +29,6 @@ pub struct Calibrating {
 }
 
 /// Shows the constants in use.
-///
-/// # Errors
-/// See [`OperationError`], as of all others here.
 pub async fn show_calibration(probe: &Probe) -> Result<RigCalibration> {
     let calibration = probe.get(Request::read_calibration()).await?;
     say::show_rows(&say::calibration_rows(&calibration), &mut probe.words())?;
@@ -40,9 +37,6 @@ pub async fn show_calibration(probe: &Probe) -> Result<RigCalibration> {
 
 /// Measures P_DC in the air and, of a rig, the motor's current without load, takes over what was measured otherwise, and shows what the
 /// probe keeps.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn calibrate(probe: &Probe, how: &Calibrating) -> Result<RigCalibration> {
     if how.drifted {
         let mut drifted = probe.get(Request::read_calibration()).await?;
@@ -71,9 +65,6 @@ pub async fn calibrate(probe: &Probe, how: &Calibrating) -> Result<RigCalibratio
 }
 
 /// Has the probe keep these constants, and compares what it keeps.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn keep_calibration(probe: &Probe, calibration: &RigCalibration) -> Result<()> {
     probe.get(Request::write_calibration(calibration)?).await?;
     let kept = probe.get(Request::read_calibration()).await?;
@@ -86,9 +77,6 @@ pub async fn keep_calibration(probe: &Probe, calibration: &RigCalibration) -> Re
 }
 
 /// Measures acceleration per count of a finger that a person turns over as asked, on this day.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn turn_over(probe: &Probe, day: u32) -> Result<RigCalibration> {
     let mut calibration = probe.get(Request::read_calibration()).await?;
     let finger = probe.get(Request::status()).await?.finger;

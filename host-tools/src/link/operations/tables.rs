@@ -8,11 +8,12 @@ use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Command, Forget, Status};
 
 use super::Result;
-use crate::link::probe::{Backup, OperationError, Probe, Question, QuestionKind};
+use crate::link::person::{Backup, Question, QuestionKind};
 use crate::link::request::Request;
 use crate::link::say;
 use crate::link::session::LinkError;
 use crate::link::table::PushTable;
+use crate::link::{OperationError, Probe};
 
 /// Asks whether to go on, after this was said.
 async fn confirm(probe: &Probe, said: String, asked: &str) -> Result<()> {
@@ -43,9 +44,6 @@ async fn consent(probe: &Probe, lost: impl FnOnce(&Table<'_>) -> String) -> Resu
 }
 
 /// Gives a texture another name.
-///
-/// # Errors
-/// See [`OperationError`], as of all others here.
 pub async fn rename(probe: &Probe, from: &Name, to: &Name) -> Result<()> {
     probe.get(Request::rename(from.clone(), to.clone())).await?;
     writeln!(probe.words(), "{from} is {to} now.")?;
@@ -53,9 +51,6 @@ pub async fn rename(probe: &Probe, from: &Name, to: &Name) -> Result<()> {
 }
 
 /// Has the probe forget something, with somebody's consent.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn forget(probe: &Probe, what: Forget) -> Result<()> {
     let said = say::forgotten(&what);
     consent(probe, |_| format!("The probe is to forget {said}.")).await?;
@@ -65,9 +60,6 @@ pub async fn forget(probe: &Probe, what: Forget) -> Result<()> {
 }
 
 /// Goes back to the table that came with the firmware, with somebody's consent; the status then.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn factory(probe: &Probe) -> Result<Status> {
     // the firmware's own table is never lost
     if !probe.hello().await?.factory {
@@ -80,9 +72,6 @@ pub async fn factory(probe: &Probe) -> Result<Status> {
 }
 
 /// Gives the probe the table of a file, with somebody's consent where another one is lost; the status then.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn push(probe: &Probe, file: &str, bytes: &[u8]) -> Result<Status> {
     let of_file = |source| OperationError::File {
         file: file.to_owned(),
@@ -108,9 +97,6 @@ pub async fn push(probe: &Probe, file: &str, bytes: &[u8]) -> Result<Status> {
 }
 
 /// Gives the probe another table instead of the one that it was made from, with somebody's consent; the status then.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn replace_table(probe: &Probe, bytes: &[u8], lost: &str, again: &str) -> Result<Status> {
     let table = Table::read(bytes)?;
     consent(probe, |_| lost.to_owned()).await?;
@@ -145,9 +131,6 @@ pub struct Settings {
 }
 
 /// Shows the probe's settings.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn settings(probe: &Probe) -> Result<Settings> {
     let status = probe.get(Request::status()).await?;
     let limits = Table::read(&probe.table().await?)?.limits();
@@ -161,18 +144,12 @@ pub async fn settings(probe: &Probe) -> Result<Settings> {
 }
 
 /// Sets for which share of false alarms the probe's limits are; `None`: that of its table.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn set_false_alarm(probe: &Probe, share: Option<f32>) -> Result<()> {
     let set = Command::SetFalseAlarm(share);
     probe.get(Request::command(set)).await
 }
 
 /// Sets whether movements may press with up to 2 N, with the consent of somebody who knows mount and stop.
-///
-/// # Errors
-/// See [`OperationError`].
 pub async fn set_high_force(probe: &Probe, on: bool) -> Result<()> {
     if on && !probe.hello().await?.high_force {
         confirm(probe, say::HIGH_FORCE.to_owned(), say::YIELDS).await?;
