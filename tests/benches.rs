@@ -5,13 +5,6 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use divan::Bencher;
-use tactus::data::properties::PropertyTable;
-use tactus::data::replay::MeasuredSlide;
-use tactus::eval::evaluate::{Method, evaluate};
-use tactus::eval::experiment::{Experiment, Protocol};
-use tactus::eval::learn::encode;
-use tactus::sim::rig::SimRig;
-use tactus::sim::world::Setup;
 use tactus_core::dsp::Plain;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer};
@@ -19,7 +12,14 @@ use tactus_core::features::Movement;
 use tactus_core::features::Observation;
 use tactus_core::features::{Block, Measurement, Properties, Property, PropertySet, Slide};
 use tactus_core::table::{Action, Experience, Table};
+use tactus_lab::data::properties::PropertyTable;
+use tactus_lab::data::replay::MeasuredSlide;
+use tactus_lab::eval::evaluate::{Method, evaluate};
+use tactus_lab::eval::experiment::{Experiment, Protocol};
+use tactus_lab::eval::learn::encode;
+use tactus_lab::sim::rig::SimRig;
 use tactus_tests::{data, numpy, skipped};
+use tactus_world::world::Setup;
 
 fn main() -> ExitCode {
     divan::main();

@@ -29,7 +29,7 @@ pub fn evaluate(file: &Path, runs: u64) -> Result<Found, &'static str> {
     if !has.is_ok_and(|has| has.status.success()) {
         return Err("no python3 with numpy (apt-get install python3-numpy)");
     }
-    let oracle = concat!(env!("CARGO_MANIFEST_DIR"), "/oracle/evaluate.py");
+    let oracle = concat!(env!("CARGO_MANIFEST_DIR"), "/core/oracle/evaluate.py");
     let mut play = python();
     play.arg(oracle).arg(file).arg(runs.to_string());
     let played = play.output().expect("python3 can be started");

@@ -1,8 +1,8 @@
 //! The rooms of every package, in their order.
 
-use crate::rules::Package;
+use super::rules::Package;
 
-pub(crate) const PACKAGES: [Package; 7] = [
+pub(crate) const PACKAGES: [Package; 11] = [
     Package {
         folder: "shared",
         steps: &[
@@ -21,32 +21,34 @@ pub(crate) const PACKAGES: [Package; 7] = [
         outside: &["lib"],
     },
     Package {
-        folder: "host-tools",
-        steps: &[
-            &["data"],
-            &["eval"],
-            &["sim"],
-            &["live"],
-            &["study"],
-            &["link"],
-            &["bringup"],
-            &["remote"],
-            &["cmd"],
-        ],
-        // link and bring-up know the core only
-        strangers: &[
-            ("link", "data"),
-            ("link", "eval"),
-            ("link", "sim"),
-            ("link", "live"),
-            ("link", "study"),
-            ("bringup", "data"),
-            ("bringup", "eval"),
-            ("bringup", "sim"),
-            ("bringup", "live"),
-            ("bringup", "study"),
-        ],
-        outside: &["lib", "main"],
+        folder: "host-tools/link",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
+    },
+    Package {
+        folder: "host-tools/world",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
+    },
+    Package {
+        folder: "host-tools/lab",
+        steps: &[&["data"], &["eval"], &["sim"], &["live"], &["remote"]],
+        strangers: &[],
+        outside: &["lib"],
+    },
+    Package {
+        folder: "host-tools/study",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
+    },
+    Package {
+        folder: "host-tools/cli",
+        steps: &[],
+        strangers: &[],
+        outside: &[],
     },
     Package {
         folder: "firmware",

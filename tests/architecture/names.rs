@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use syn::{ImplItem, Item, Type};
 
-use crate::source::{FileId, ModuleId, Named, Source, is_test};
+use super::source::{FileId, ModuleId, Named, Source, is_test};
 
 /// A definition: the module it is in, and its name.
 pub(crate) type Definition = (ModuleId, String);

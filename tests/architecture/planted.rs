@@ -4,7 +4,7 @@ use std::fs;
 
 use tempfile::TempDir;
 
-use crate::rules::{MOST_LINES, Package, faults};
+use super::rules::{MOST_LINES, Package, faults};
 
 const CORE: Package = Package {
     folder: "core",

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use proc_macro2::{TokenStream, TokenTree};
 
-use crate::rules::{files, name};
+use super::rules::{files, name};
 
 type Listed = &'static [(&'static str, &'static [&'static str])];
 
@@ -119,7 +119,7 @@ fn paths(tokens: TokenStream) -> Vec<Vec<String>> {
 
 #[test]
 fn a_peripheral_has_one_owner() {
-    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware/src");
+    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/src");
     let faults = faults(&firmware);
     assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
     let mut owners = BTreeMap::new();
@@ -134,7 +134,7 @@ fn a_peripheral_has_one_owner() {
 /// Critical sections do not mask the highest priority: who has it must not share data by them, as all drivers do.
 #[test]
 fn the_slots_alone_have_the_highest_priority() {
-    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware/src");
+    let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/src");
     let texts = files(&firmware)
         .into_iter()
         .map(|file| fs::read_to_string(file).unwrap());

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::names::Names;
-use crate::source::{FileId, Source};
-use crate::uses::{Use, uses};
+use super::names::Names;
+use super::source::{FileId, Source};
+use super::uses::{Use, uses};
 
 /// Lines that a file of product code may have, its inline tests counted.
 pub(crate) const MOST_LINES: usize = 600;

@@ -6,8 +6,8 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use syn::visit::{self, Visit};
 use syn::{Attribute, Expr, Item, Lit, Macro, Meta, Stmt, Visibility};
 
-use crate::names::{Definition, Names, segments, self_type};
-use crate::source::{FileId, ModuleId, attributes, definition, is_test, leaves};
+use super::names::{Definition, Names, segments, self_type};
+use super::source::{FileId, ModuleId, attributes, definition, is_test, leaves};
 
 /// A place where a file uses another one.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
-use tactus::data::replay::measure;
-use tactus::eval::learn::{Expected, learn_for};
-use tactus::sim::collection::{Collection, calibrated};
+use tactus_lab::data::replay::measure;
+use tactus_lab::eval::learn::{Expected, learn_for};
+use tactus_lab::sim::collection::{Collection, calibrated};
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{ExplorerError, Method, ObserveError};
 use tactus_core::features::{

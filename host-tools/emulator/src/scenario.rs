@@ -1,17 +1,17 @@
-//! Plays scenarios for the handheld probe, those in `scenarios/` and others: see [`tactus::sim::scenario`].
+//! Plays scenarios for the handheld probe, those in `scenarios/` and others: see [`tactus_lab::sim::scenario`].
 //!
 //! The person sees the display and nothing else, as it is decoded from the bytes on the wire.
 
 use std::path::Path;
 
-use tactus::eval::show::count;
-use tactus::sim::faults::Fault;
-use tactus::sim::flow::HEIGHT_MM;
-use tactus::sim::handheld::ground;
-use tactus::sim::person::Hand;
-use tactus::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
-use tactus::sim::world::{NotLifted, Setup};
 use tactus_core::sensor::FingerName;
+use tactus_lab::eval::show::count;
+use tactus_lab::sim::handheld::ground;
+use tactus_lab::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
+use tactus_world::faults::Fault;
+use tactus_world::flow::HEIGHT_MM;
+use tactus_world::person::Hand;
+use tactus_world::world::{NotLifted, Setup};
 
 use crate::board::{Display, Emulator, Error, Options, Output};
 

@@ -6,8 +6,8 @@
 
 use std::cell::RefCell;
 
-use tactus::live::Session;
-use tactus::remote::Remote;
+use tactus_lab::live::Session;
+use tactus_lab::remote::Remote;
 
 #[derive(Default)]
 struct Page {
@@ -34,7 +34,7 @@ pub extern "C" fn request(length: usize) -> *mut u8 {
 /// The request's bytes are the trials that the world of the page was learned from: they lie beside the module.
 #[unsafe(no_mangle)]
 pub extern "C" fn world() {
-    PAGE.with_borrow_mut(|page| tactus::live::bring_world(std::mem::take(&mut page.request)));
+    PAGE.with_borrow_mut(|page| tactus_lab::live::bring_world(std::mem::take(&mut page.request)));
 }
 
 /// Has the simulated probe do what the request asks for: the bytes of the reply.

@@ -2,11 +2,11 @@
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tactus::eval::evaluate::Method;
-use tactus::eval::experiment::Protocol;
 use tactus_core::explorer::Config;
 use tactus_core::features::FeatureSet;
 use tactus_core::table::{Drift, is_false_alarm};
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::eval::experiment::Protocol;
 
 const METHODS: [Method; 8] = [
     Method::Fused,

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tactus::data::properties::PropertyTable;
-use tactus::eval::evaluation::{Asked, evaluation};
-use tactus::eval::experiment::{Experiment, Protocol};
-use tactus::eval::learn::Expected;
-use tactus::eval::{novelty, verify};
 use tactus_core::explorer::{self, Config};
+use tactus_lab::data::properties::PropertyTable;
+use tactus_lab::eval::evaluation::{Asked, evaluation};
+use tactus_lab::eval::experiment::{Experiment, Protocol};
+use tactus_lab::eval::learn::Expected;
+use tactus_lab::eval::{novelty, verify};
 
 use crate::arguments;
 use crate::error::Raise as _;

@@ -6,13 +6,13 @@ use numpy::PyArray1;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use serde::Serialize;
-use tactus::eval::evaluate::{MAX_TEXTURES, Method, explorer};
-use tactus::eval::transcript::Answer;
-use tactus::eval::verify;
 use tactus_core::explorer::{self, ExpectedOutcome};
 use tactus_core::features::{Property, PropertySet};
 use tactus_core::probe::explore::Random;
 use tactus_core::table::{Action, Table as Read};
+use tactus_lab::eval::evaluate::{MAX_TEXTURES, Method, explorer};
+use tactus_lab::eval::transcript::Answer;
+use tactus_lab::eval::verify;
 
 use crate::arguments;
 use crate::error::Raise as _;

@@ -5,10 +5,10 @@ use std::sync::OnceLock;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tactus::data::recording::{PAC_RATE_HZ, Recording};
-use tactus::data::replay::{MeasuredSlide, measure};
 use tactus_core::dsp::{BIN_HZ, BINS, Plan};
 use tactus_core::features::{Measurement, Movement, Observation, Property};
+use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
+use tactus_lab::data::replay::{MeasuredSlide, measure};
 
 use crate::error::{Raise as _, SlideError, sentence};
 use crate::values::array;

@@ -9,10 +9,10 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use tactus::data::recording::{PAC_RATE_HZ, Recording};
-use tactus::data::recordings::RecordingSet;
-use tactus::data::replay::{MeasureError, MeasuredSlide, measure, measure_all};
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
+use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::replay::{MeasureError, MeasuredSlide, measure, measure_all};
 
 use crate::error::Raise as _;
 use crate::features::{Features, plan};

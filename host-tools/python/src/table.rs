@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use tactus::data::table_file::read_table;
-use tactus::data::whole::write_whole;
-use tactus::eval::evaluate::Method;
-use tactus::eval::first::{FirstError, learn_first};
-use tactus::eval::learn::{Expected, learn_for};
-use tactus::eval::table_summary::TableSummary;
 use tactus_core::explorer;
 use tactus_core::features::Movement;
 use tactus_core::table::{FALSE_ALARM, Table as Read};
+use tactus_lab::data::table_file::read_table;
+use tactus_lab::data::whole::write_whole;
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::eval::first::{FirstError, learn_first};
+use tactus_lab::eval::learn::{Expected, learn_for};
+use tactus_lab::eval::table_summary::TableSummary;
 
 use crate::arguments;
 use crate::error::Raise as _;

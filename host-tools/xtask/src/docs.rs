@@ -39,21 +39,12 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
         return timeline::timeline(&picture.to_string_lossy(), &[]);
     }
     if options.check || options.write {
-        // the picture that a test of the simulator draws
-        let mut test = cargo();
-        test.args([
-            "test",
-            "--package",
-            "tactus-probe",
-            "--lib",
-            "come_out_of_all_fingers",
-        ]);
-        if options.write {
-            test.env("TACTUS_BOOK", "write");
-        }
-        run(&mut test)?;
         // outputs, plots, and the page of bad input are made from the recordings that one of the book's tests writes
-        let all = [("book", "the_recordings"), ("book", ""), ("bad_input", "")];
+        let all = [
+            ("documents", "book::the_recordings"),
+            ("documents", "book::"),
+            ("command", "bad_input::"),
+        ];
         let begin = usize::from(!options.write);
         for (name, filter) in &all[begin..] {
             let mut test = cargo();

@@ -46,9 +46,9 @@ pub(crate) fn check() -> Result<()> {
     println!("== a session with a probe in software");
     let mut session = cargo();
     // as the step of the tests has built it
-    session.args(["test", "--workspace", "--test", "device"]);
+    session.args(["test", "--workspace", "--test", "command"]);
     session
-        .args(["--", "package::"])
+        .args(["--", "device::package::"])
         .env("TACTUS_PYTHON", python);
     run(&mut session)
 }

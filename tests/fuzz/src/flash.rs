@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 use embassy_futures::block_on;
-use tactus::eval::learn::learn;
-use tactus::sim::flash::RamFlash;
+use tactus_lab::eval::learn::learn;
+use tactus_lab::sim::flash::RamFlash;
 use tactus_core::explorer::Method;
 use tactus_core::features::{FeatureSet, Movement, Observation, Properties};
 use tactus_core::rig::calibration::RigCalibration;

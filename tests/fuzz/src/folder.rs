@@ -7,10 +7,10 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use sha2::{Digest as _, Sha256};
-use tactus::data::fabricslide::FabricSet;
-use tactus::data::properties::PropertyTable;
-use tactus::data::recordings::{RecordingError, RecordingSet};
-use tactus::eval::experiment::Experiment;
+use tactus_study::fabricslide::FabricSet;
+use tactus_lab::data::properties::PropertyTable;
+use tactus_lab::data::recordings::{RecordingError, RecordingSet};
+use tactus_lab::eval::experiment::Experiment;
 
 /// Between manifest and file.
 const RULE: &[u8] = b"\n---\n";
@@ -96,7 +96,7 @@ fn opened(folder: &Path) -> Result<(), RecordingError> {
             #[cfg(feature = "planted")]
             assert!(pac.iter().all(|s| s.abs_diff(0) < 2048), "planted");
             let plan = tactus_core::dsp::Plan::new();
-            drop(tactus::data::replay::measure(&plan, &slide));
+            drop(tactus_lab::data::replay::measure(&plan, &slide));
         }
     }
     Ok(())
@@ -125,7 +125,7 @@ impl Drop for Folder {
 
 /// Folders that are whole, one of each kind.
 pub(crate) fn seeds() -> Vec<Vec<u8>> {
-    let columns = tactus::data::recordings::own::COLUMNS.join(",");
+    let columns = tactus_lab::data::recordings::own::COLUMNS.join(",");
     let own = format!(
         "{columns}\n3,felt,1,0.5,25,0.02,0.1,2.2,,,a.npy,2200,HASH,a.npy,100,HASH,,100,\n\
          3,felt,2,0.5,25,0.02,0.1,,a.npy,HASH,a.npy,2200,HASH,a.npy,100,HASH,a.npy,110,HASH\n"

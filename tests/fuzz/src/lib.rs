@@ -15,7 +15,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use embassy_futures::block_on;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use tactus::eval::learn::know_lengths;
+use tactus_lab::eval::learn::know_lengths;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{FUSED_BANDS, Observation, Properties};
 use tactus_core::probe::teach::put_in_force;
@@ -44,7 +44,7 @@ pub fn wire(data: &[u8]) {
             .filter_map(|&byte| receiver.push::<Request>(byte))
             .flatten()
             .for_each(heard);
-        tactus::link::Session::default().receive(body);
+        tactus_link::Session::default().receive(body);
         return;
     }
     // a frame that is whole
@@ -57,7 +57,7 @@ pub fn wire(data: &[u8]) {
     let requests: Vec<_> = requests.collect();
     assert!(requests.len() <= 1, "one 0, one frame");
     requests.into_iter().flatten().for_each(heard);
-    for report in tactus::link::Session::default().receive(&frame) {
+    for report in tactus_link::Session::default().receive(&frame) {
         said_again(&report);
         if let Event::SlideReport { observed, .. } = &report.event {
             observed.observation();

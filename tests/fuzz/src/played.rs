@@ -2,8 +2,8 @@
 
 use fastrand::Rng;
 use serde_json::{Value, json};
-use tactus::sim::handheld::Person;
-use tactus::sim::scenario::{Scenario, Step, texture};
+use tactus_lab::sim::handheld::Person;
+use tactus_lab::sim::scenario::{Scenario, Step, texture};
 
 /// Words that the hand is followed for after each thing it means to do: 20 ms.
 const WORDS: usize = 88;

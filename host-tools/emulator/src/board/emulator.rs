@@ -13,8 +13,8 @@ use rigless::mcu::Operate as _;
 use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
-use tactus::sim::faults::Fault;
-use tactus::sim::world::Setup;
+use tactus_world::faults::Fault;
+use tactus_world::world::Setup;
 
 use super::chip::Board;
 use super::cycles::{CycleProfile, Tracer};

@@ -1,6 +1,6 @@
 //! The handheld's sensor of motion on SPI4, if there is one.
 
-use tactus::sim::flow::{Flow, Ground};
+use tactus_world::flow::{Flow, Ground};
 
 /// CR1 of an SPI (RM0090 28.5.1): both bits of the mode, the divider of the clock, the order of the bits.
 const CR1_MODE: u64 = 0b11;

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU64;
 
-use tactus::sim::flow::Ground;
+use tactus_world::flow::Ground;
 
 /// What else a run is made from.
 #[derive(Clone, Debug)]

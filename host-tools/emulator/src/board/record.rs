@@ -1,6 +1,6 @@
 //! How slides were really made: forces and speeds of the world, instants of the sensor's slots.
 
-use tactus::sim::world::Truth;
+use tactus_world::world::Truth;
 
 /// Less force is no contact, N.
 pub(crate) const CONTACT_N: f64 = 0.05;

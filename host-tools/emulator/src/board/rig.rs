@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tactus::sim::parts::ClockMode;
-use tactus::sim::world::{Setup, World};
 use tactus_core::sensor::FingerName;
+use tactus_world::parts::ClockMode;
+use tactus_world::world::{Setup, World};
 
 use super::display::Display;
 use super::line::LineNoise;

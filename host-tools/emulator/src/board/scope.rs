@@ -1,7 +1,7 @@
 //! What the probes of an oscilloscope see at the chip's pins, beside [`Rig::trace`](super::Rig::trace): the sensor's bus, the encoder,
 //! the motor's current and the emergency stop.
 
-use tactus::sim::encoder::Edge;
+use tactus_world::encoder::Edge;
 
 /// A frame over the sensor's bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,6 +1,6 @@
 //! The stage's PWM between two looks at its timer.
 
-use tactus::sim::ripple::PwmPhase;
+use tactus_world::ripple::PwmPhase;
 
 /// A timer that counts up and begins again, its output high in the first counts.
 #[derive(Clone, Copy, PartialEq, Debug)]

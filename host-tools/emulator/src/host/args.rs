@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
-use tactus::eval::evaluate::Method;
 use tactus_core::sensor::FingerName;
+use tactus_lab::eval::evaluate::Method;
 
 use crate::board::Error;
 

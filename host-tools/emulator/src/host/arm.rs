@@ -4,9 +4,9 @@
 use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};
 use std::net::{TcpListener, TcpStream};
 
-use tactus::sim::arm::Arm;
-use tactus::sim::arm_program::ArmProgram;
 use tactus_core::wire::{self, Command, Event, MAX_FRAME, Report, Request};
+use tactus_world::arm::Arm;
+use tactus_world::arm_program::ArmProgram;
 
 use crate::board::Emulator;
 

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use tactus::eval::show::count;
-use tactus::link::Request;
-use tactus::link::follow::{ALLOWED, Agreement, Follower};
-use tactus::sim::played::PlayCounts;
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::{Action, Contents, Table, TableError, white};
 use tactus_core::wire::{Command, Counts, Event, Identify, Report, SlideReport, Verdict};
+use tactus_lab::eval::show::count;
+use tactus_link::Request;
+use tactus_link::follow::{ALLOWED, Agreement, Follower};
+use tactus_world::played::PlayCounts;
 
 use super::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::board::referee::Violation;

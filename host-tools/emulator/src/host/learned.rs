@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::sim::collection::{Collection, texture_number};
-use tactus::sim::recorded::RecordedTexture;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::Table;
+use tactus_lab::sim::collection::{Collection, texture_number};
+use tactus_lab::sim::recorded::RecordedTexture;
 
 use super::args::{World, hex_sha256};
 use super::progress;

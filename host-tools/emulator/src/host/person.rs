@@ -1,8 +1,8 @@
 //! A person who holds the emulated handheld and does what its display says, while a host talks to it.
 
-use tactus::sim::person::{Hand, Manner};
-use tactus::sim::scenario::Step;
 use tactus_core::wire::{Event, Prompt, Report};
+use tactus_lab::sim::scenario::Step;
+use tactus_world::person::{Hand, Manner};
 
 use crate::board::{Display, Emulator};
 

@@ -1,11 +1,11 @@
-//! A host in the same process: [`tactus::link`] over the emulated board's USART3, by virtual time.
+//! A host in the same process: [`tactus_link`] over the emulated board's USART3, by virtual time.
 
 use std::task::Poll;
 
-use tactus::link::{Job, LinkError, PushTable, Request, Session, Transaction};
 use tactus_core::rig::Fault;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Phase, Report, Reset};
+use tactus_link::{Job, LinkError, PushTable, Request, Session, Transaction};
 
 use crate::board::{Emulator, Error};
 

@@ -2,8 +2,8 @@
 //! reports and by the world's truth.
 
 use serde_json::{Map, Value};
-use tactus::sim::world::Truth;
 use tactus_core::wire::{Event, Phase};
+use tactus_world::world::Truth;
 
 use crate::board::CONTACT_N;
 

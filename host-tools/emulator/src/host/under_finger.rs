@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use tactus::data::recordings::RecordingSet;
-use tactus::sim::collection::{Collection, LearnError, calibrated, texture_name};
-use tactus::sim::played::Played;
-use tactus::sim::recorded::{PlayError, RecordedTexture};
-use tactus::sim::world::Setup;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::sim::collection::{Collection, LearnError, calibrated, texture_name};
+use tactus_lab::sim::recorded::{PlayError, RecordedTexture};
+use tactus_world::played::Played;
+use tactus_world::world::Setup;
 
 use crate::board::{Emulator, Error, Options};
 

@@ -17,10 +17,10 @@ use std::process::ExitCode;
 
 use clap::Args as Arguments;
 use serde_json::Value;
-use tactus::eval::learn::{TableError, know_lengths};
-use tactus::sim::collection::Collection;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
+use tactus_lab::eval::learn::{TableError, know_lengths};
+use tactus_lab::sim::collection::Collection;
 
 use self::counter::Bench;
 use self::error::BenchError;

@@ -6,7 +6,7 @@ mod report;
 use std::time::Instant;
 
 use clap::Args as Arguments;
-use tactus::eval::evaluate::Method;
+use tactus_lab::eval::evaluate::Method;
 
 pub use self::explorations::{Group, Results, recorded, run as explore, simulated};
 use self::report::Report;

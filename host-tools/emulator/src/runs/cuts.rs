@@ -12,13 +12,13 @@ use std::path::Path;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::Collection;
-use tactus::sim::world::{Setup, World};
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Name;
 use tactus_core::wire::{Event, Identify, Reset};
+use tactus_lab::sim::collection::Collection;
+use tactus_link::{ReadTable, Request};
+use tactus_world::world::{Setup, World};
 
 use self::held::{CutError, Held, Left, Operation, judge};
 pub(crate) use self::outcome::{Cuts, Outcome};

@@ -12,10 +12,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args as Arguments;
 use serde_json::{Value, json};
-use tactus::eval::show::count;
-use tactus::sim::fault_case::{Bench, Case};
 use tactus_core::rig::Fault as Named;
 use tactus_core::table::factory;
+use tactus_lab::eval::show::count;
+use tactus_lab::sim::fault_case::{Bench, Case};
 
 use self::board::{BoardBench, BoardCase};
 use super::error::RunError;

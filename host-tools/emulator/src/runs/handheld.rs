@@ -2,12 +2,12 @@
 
 use clap::Args as Arguments;
 use serde_json::json;
-use tactus::link::Session;
-use tactus::sim::person::Manner;
-use tactus::sim::scenario::{Scenario, Step, texture};
-use tactus::sim::textures::TEXTURES;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Counts, Event};
+use tactus_lab::sim::scenario::{Scenario, Step, texture};
+use tactus_link::Session;
+use tactus_world::person::Manner;
+use tactus_world::textures::TEXTURES;
 
 use super::error::RunError;
 use crate::board::{Display, Emulator, Error};

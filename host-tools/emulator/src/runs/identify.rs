@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args as Arguments;
-use tactus::eval::show::{Show, count, is_right};
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Phase, Report};
+use tactus_lab::eval::show::{Show, count, is_right};
 
 use super::error::RunError;
 use crate::board::{self, Emulator, Options};

@@ -6,10 +6,10 @@ pub mod error;
 use std::path::{Path, PathBuf};
 
 use clap::Args as Arguments;
-use tactus::link::Request;
-use tactus::sim::faults::Fault;
-use tactus::sim::ripple::PwmPhase;
-use tactus::sim::world::Setup;
+use tactus_link::Request;
+use tactus_world::faults::Fault;
+use tactus_world::ripple::PwmPhase;
+use tactus_world::world::Setup;
 
 pub use draw::{Picture, Row, Span};
 use error::ScopeError;

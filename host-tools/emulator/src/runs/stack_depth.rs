@@ -4,8 +4,8 @@ use std::path::Path;
 
 use clap::Args as Arguments;
 use serde_json::{Value, json};
-use tactus::sim::world::Setup;
 use tactus_core::wire::{Command, Event, Identify, Phase};
+use tactus_world::world::Setup;
 
 use super::error::RunError;
 use crate::board::{Emulator, Options, StackLayout, StackLevel, StackUse};

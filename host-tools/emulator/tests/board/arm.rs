@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use tactus::link::Request;
-use tactus::sim::arm_program::Misbehaves;
-use tactus::sim::collection::{Collection, calibrated};
 use tactus_core::rig::Fault;
 use tactus_core::wire::{Command, Event, Identify, Verdict};
 use tactus_emulator::board::Options;
 use tactus_emulator::host::arm::OnTheLine;
 use tactus_emulator::host::talk::{Talk, TalkError};
 use tactus_emulator::host::under_finger::mounted;
+use tactus_lab::sim::collection::{Collection, calibrated};
+use tactus_link::Request;
+use tactus_world::arm_program::Misbehaves;
 
 use crate::common::elf_of;
 

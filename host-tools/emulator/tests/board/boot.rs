@@ -1,10 +1,10 @@
 //! The real ELF on the board.
 
-use tactus::sim::faults::Fault;
-use tactus::sim::world::Setup;
 use tactus_core::wire::{Command, Event, Phase};
 use tactus_emulator::board::{Emulator, Options, Output};
 use tactus_emulator::host::talk::Talk;
+use tactus_world::faults::Fault;
+use tactus_world::world::Setup;
 
 use crate::common::elf;
 

@@ -1,4 +1,4 @@
-//! A rig's first evening on the emulated board: `tactus::bringup` with the self-test image, and a person who does what is asked and
+//! A rig's first evening on the emulated board: `tactus_link::bringup` with the self-test image, and a person who does what is asked and
 //! tells what the world shows. Rigs that are built as they should be pass, and of others the mistake is named.
 //!
 //! A mistake's evening begins with the step that should find it, as if those before had passed earlier: the journal makes that
@@ -9,22 +9,22 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use tactus::bringup::judge::Finding;
-use tactus::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Owner, Person, Probe, Report,
-    STEPS, Step, Trouble,
-};
-use tactus::link::Request;
-use tactus::sim::encoder::Cut;
-use tactus::sim::faults::Fault;
-use tactus::sim::person::{Hand, Manner};
-use tactus::sim::stage::{SUPPLY_V, TRAVEL_MM};
-use tactus::sim::wiring::Miswired;
-use tactus::sim::world::{Reached, Setup};
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as Told, Reset};
 use tactus_emulator::board::{Emulator, Options, pins};
 use tactus_emulator::host::talk::{Talk, TalkError};
+use tactus_link::Request;
+use tactus_link::bringup::judge::Finding;
+use tactus_link::bringup::{
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Owner, Person, Probe, Report,
+    STEPS, Step, Trouble,
+};
+use tactus_world::encoder::Cut;
+use tactus_world::faults::Fault;
+use tactus_world::person::{Hand, Manner};
+use tactus_world::stage::{SUPPLY_V, TRAVEL_MM};
+use tactus_world::wiring::Miswired;
+use tactus_world::world::{Reached, Setup};
 
 use crate::common::elf_of;
 
@@ -177,7 +177,7 @@ struct Helper<'r> {
 }
 
 impl Helper<'_> {
-    fn truth(&self) -> tactus::sim::world::Truth {
+    fn truth(&self) -> tactus_world::world::Truth {
         self.rig.emulator.borrow().rig().world().truth()
     }
 

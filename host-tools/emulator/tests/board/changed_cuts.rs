@@ -3,9 +3,6 @@
 
 use std::path::Path;
 
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::Collection;
-use tactus::sim::person::Manner;
 use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Event, Identify, Phase, Report, Reset};
@@ -13,6 +10,9 @@ use tactus_emulator::board::{Emulator, FlashWrite, Options};
 use tactus_emulator::host::power_cut::{Cut, Torn, left_by};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, Unknown};
+use tactus_lab::sim::collection::Collection;
+use tactus_link::{ReadTable, Request};
+use tactus_world::person::Manner;
 
 use crate::common::{boot, elf, elf_of, with_limits_of_change};
 use crate::handheld_link::{Held, shows};

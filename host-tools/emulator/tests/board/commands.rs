@@ -6,13 +6,13 @@ use std::path::Path;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::sim::stage::TRAVEL_MM;
-use tactus::sim::world::Setup;
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::table::Name;
 use tactus_core::wire::{Command, Forget, Identify, MAX_FRAME, Request, Train, encode};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{Talk, TalkError};
+use tactus_world::stage::TRAVEL_MM;
+use tactus_world::world::Setup;
 
 use crate::common::{elf, ready};
 

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use tactus::link::Request;
-use tactus::sim::world::Setup;
 use tactus_core::wire::Event;
 use tactus_emulator::board::{Emulator, Options, Switch};
 use tactus_emulator::host::talk::Talk;
+use tactus_link::Request;
+use tactus_world::world::Setup;
 
 use crate::common::{elf, ready};
 use crate::faults::identify;

@@ -3,14 +3,14 @@
 
 use std::path::Path;
 
-use tactus::eval::learn::know_lengths;
-use tactus::sim::collection::Collection;
-use tactus::sim::faults::Fault;
 use tactus_core::explorer::Method;
 use tactus_core::wire::{Event, Identify, Phase};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::timeline::{Part, Timeline};
 use tactus_emulator::host::under_finger::{self, Known};
+use tactus_lab::eval::learn::know_lengths;
+use tactus_lab::sim::collection::Collection;
+use tactus_world::faults::Fault;
 
 use crate::common::{boot, elf};
 

@@ -4,16 +4,16 @@ use std::sync::OnceLock;
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::eval::evaluate::Method;
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::Collection;
-use tactus::sim::world::Setup;
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Report, Train};
 use tactus_emulator::host::exploration::explore;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};
 use tactus_emulator::runs::campaign;
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::sim::collection::Collection;
+use tactus_link::{ReadTable, Request};
+use tactus_world::world::Setup;
 
 use crate::common::{boot, elf};
 

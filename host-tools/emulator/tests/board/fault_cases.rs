@@ -1,8 +1,8 @@
 //! A few cases of the campaign of faults on the emulated board.
 
-use tactus::sim::fault_case;
 use tactus_core::table::factory;
 use tactus_emulator::runs::faults::board::{BoardBench, BoardCase, Upset};
+use tactus_lab::sim::fault_case;
 
 use crate::common::elf;
 

@@ -3,13 +3,13 @@
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::sim::encoder::Cut;
-use tactus::sim::faults::Fault;
-use tactus::sim::world::Setup;
 use tactus_core::rig::Fault as Seen;
 use tactus_core::wire::{Command, Event, Identify, MAX_FRAME, Phase, Request, Reset, encode};
 use tactus_emulator::board::{Emulator, Options, Output};
 use tactus_emulator::host::talk::{Talk, TalkError};
+use tactus_world::encoder::Cut;
+use tactus_world::faults::Fault;
+use tactus_world::world::Setup;
 
 use crate::common::{elf, ready};
 

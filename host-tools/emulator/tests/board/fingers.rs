@@ -2,9 +2,6 @@
 
 use std::path::PathBuf;
 
-use tactus::sim::collection::Collection;
-use tactus::sim::parts::PartFault;
-use tactus::sim::world::Setup;
 use tactus_core::explorer::Method;
 use tactus_core::rig::Fault;
 use tactus_core::sensor::{FingerCode, FingerName};
@@ -13,6 +10,9 @@ use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::exploration::explore;
 use tactus_emulator::host::talk::Talk;
 use tactus_emulator::host::under_finger::{mounted_with, simulated_with};
+use tactus_lab::sim::collection::Collection;
+use tactus_world::parts::PartFault;
+use tactus_world::world::Setup;
 
 use crate::common::{elf_of, ready};
 use crate::faults::identify;

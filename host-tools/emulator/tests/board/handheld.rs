@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use tactus::sim::scenario::Scenario;
 use tactus_core::sensor::FingerName;
 use tactus_emulator::board::Emulator;
+use tactus_lab::sim::scenario::Scenario;
 
 use crate::common::elf_of;
 

@@ -1,9 +1,9 @@
 //! "Is it the same as that one?", asked of the real ELF of the handheld by its button alone: judged by what lies under the
 //! finger, from the display and the go / no-go output.
 
-use tactus::sim::person::Manner;
-use tactus::sim::scenario::texture;
 use tactus_core::table::Table;
+use tactus_lab::sim::scenario::texture;
+use tactus_world::person::Manner;
 
 use crate::handheld_link::{Held, shows};
 

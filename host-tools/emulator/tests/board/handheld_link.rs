@@ -3,17 +3,6 @@
 
 use std::path::Path;
 
-use tactus::data::recorder::Recorder;
-use tactus::data::recording::{Recording, Texture};
-use tactus::data::recordings::{RecordingSet, RecordingWriter};
-use tactus::eval::learn::learn;
-use tactus::link::{PushTable, ReadTable, Request};
-use tactus::sim::collection::Collection;
-use tactus::sim::flow::HEIGHT_MM;
-use tactus::sim::handheld::ground;
-use tactus::sim::parts::PartFault;
-use tactus::sim::person::Manner;
-use tactus::sim::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::features::{FeatureSet, Measurement, Observation, Slide};
@@ -26,6 +15,17 @@ use tactus_core::wire::{
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::person::Person;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
+use tactus_lab::data::recorder::Recorder;
+use tactus_lab::data::recording::{Recording, Texture};
+use tactus_lab::data::recordings::{RecordingSet, RecordingWriter};
+use tactus_lab::eval::learn::learn;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::handheld::ground;
+use tactus_link::{PushTable, ReadTable, Request};
+use tactus_world::flow::HEIGHT_MM;
+use tactus_world::parts::PartFault;
+use tactus_world::person::Manner;
+use tactus_world::world::Setup;
 
 use crate::common::{elf_of, with_limits_of_change};
 
@@ -58,7 +58,7 @@ impl Held {
             textures: vec![BURLAP],
             trials: 1,
         };
-        let number = tactus::sim::scenario::texture(texture).unwrap();
+        let number = tactus_lab::sim::scenario::texture(texture).unwrap();
         let setup = collection.setup(number, 77);
         Self::of(elf, setup, manner, store)
     }
@@ -411,7 +411,7 @@ fn slides_that_are_recorded_by_hand_are_learned_pushed_and_known() {
     const SLIDES: u8 = 4;
     let names = ["Burlap", "Cork", "Marble"];
     let numbers =
-        ["burlap", "corkboard", "marble"].map(|n| tactus::sim::scenario::texture(n).unwrap());
+        ["burlap", "corkboard", "marble"].map(|n| tactus_lab::sim::scenario::texture(n).unwrap());
     let Some(mut held) = Held::new("burlap", Manner::default()) else {
         return;
     };

@@ -3,9 +3,6 @@
 
 use std::path::Path;
 
-use tactus::link::{PushTable, ReadTable, Request};
-use tactus::sim::collection::{Collection, calibrated};
-use tactus::sim::person::Manner;
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
 use tactus_core::table::{Change, Name, Table, TableError, amend};
@@ -14,6 +11,9 @@ use tactus_emulator::board::{FlashWrite, places};
 use tactus_emulator::host::power_cut::{Cut, Torn, left_by};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};
+use tactus_lab::sim::collection::{Collection, calibrated};
+use tactus_link::{PushTable, ReadTable, Request};
+use tactus_world::person::Manner;
 
 use crate::changed_cuts::reboot;
 use crate::common::{boot, elf, elf_of};

@@ -3,12 +3,6 @@
 
 use std::path::PathBuf;
 
-use tactus::eval::learn::learn;
-use tactus::link::Request;
-use tactus::link::follow::Follower;
-use tactus::sim::collection::Collection;
-use tactus::sim::handheld::slides;
-use tactus::sim::person::Manner;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Property;
@@ -17,6 +11,12 @@ use tactus_core::table::Table;
 use tactus_core::wire::{Command, Event, Identify};
 use tactus_emulator::board::Emulator;
 use tactus_emulator::host::talk::TIMEOUT_S;
+use tactus_lab::eval::learn::learn;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::handheld::slides;
+use tactus_link::Request;
+use tactus_link::follow::Follower;
+use tactus_world::person::Manner;
 
 use crate::common::elf_of;
 use crate::handheld_link::{Held, shows};

@@ -4,8 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use tactus::link::{PushTable, ReadTable, Request};
-use tactus::sim::collection::Collection;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::StoreError;
 use tactus_core::table::{Name, Table, TableError};
@@ -13,6 +11,8 @@ use tactus_core::wire::{Command, Event, Failure, Forget, Identify, MemoryError, 
 use tactus_emulator::board::Options;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{Unknown, mounted};
+use tactus_lab::sim::collection::Collection;
+use tactus_link::{PushTable, ReadTable, Request};
 
 use crate::common::{boot, elf, unpacked, with_limits_of_change};
 

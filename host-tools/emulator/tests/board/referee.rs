@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use tactus::sim::world::Setup;
 use tactus_emulator::board::referee::{Rule, Violation};
 use tactus_emulator::board::{Emulator, Options};
+use tactus_world::world::Setup;
 
 /// What a small firmware does: one access each.
 #[derive(Clone, Copy)]

@@ -2,11 +2,11 @@
 //!
 //! TACTUS_SELFTEST_ELF names the ELF, which `cargo xtask build` makes; without it there is nothing to run.
 
-use tactus::sim::encoder::Cut;
-use tactus::sim::faults::Fault;
-use tactus::sim::person::{Hand, Manner};
-use tactus::sim::world::Setup;
 use tactus_emulator::board::{Emulator, Options, Output, ResetCause};
+use tactus_world::encoder::Cut;
+use tactus_world::faults::Fault;
+use tactus_world::person::{Hand, Manner};
+use tactus_world::world::Setup;
 
 use crate::common::elf_of;
 

@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use tactus::link::{Port, Probe};
+use tactus_link::{Port, Probe};
 use tactus_core::table::Table;
 
 use crate::common::elf;

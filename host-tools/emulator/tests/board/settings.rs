@@ -1,14 +1,14 @@
 //! The store of the real firmware, over many writes: its pages turn in time, and it loses nothing.
 
-use tactus::link::{PushTable, Request};
-use tactus::sim::mount::Mount;
-use tactus::sim::world::Setup;
 use tactus_core::features::{Movement, Properties, Property, PropertySet};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::{Experience, Texture, encode};
 use tactus_core::wire::{Command, Event, Identify, Train};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
+use tactus_link::{PushTable, Request};
+use tactus_world::mount::Mount;
+use tactus_world::world::Setup;
 
 use crate::common::{elf, ready};
 

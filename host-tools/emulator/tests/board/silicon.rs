@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use tactus::sim::world::Setup;
 use tactus_core::rig::Fault as Seen;
 use tactus_core::wire::{Event, Reset};
 use tactus_emulator::board::referee::Rule;
 use tactus_emulator::board::{Emulator, Options, Output, Switch};
 use tactus_emulator::host::talk::{Talk, TalkError};
+use tactus_world::world::Setup;
 
 use crate::common::{elf, elf_of, ready};
 use crate::faults::{When, board, board_with, identify, is_time};

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
-use tactus::sim::world::Setup;
 use tactus_emulator::board::cycles::Spent;
 use tactus_emulator::board::{Emulator, Options};
+use tactus_world::world::Setup;
 
 use crate::common::elf_of;
 

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use tactus::sim::world::Setup;
 use tactus_core::rig::Fault as Seen;
 use tactus_core::wire::{Command, Event};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::Talk;
+use tactus_world::world::Setup;
 
 use crate::common::{elf, elf_of, ready};
 use crate::faults::identify;

@@ -4,14 +4,14 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::Collection;
 use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table, Tally};
 use tactus_core::wire::{Event, Forget, Identify, Status, TextureLearned, Train, Verdict};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
 use tactus_emulator::host::under_finger::{self, Known, Unknown};
+use tactus_lab::sim::collection::Collection;
+use tactus_link::{ReadTable, Request};
 
 use crate::common::{boot, elf};
 

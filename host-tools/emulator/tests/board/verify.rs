@@ -1,11 +1,11 @@
 //! "The same as this one?" by the real ELF, judged by what lies under its finger; and the output that follows the answer.
 
-use tactus::link::Request;
 use tactus_core::explorer::{Answer, Strategy};
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Event, Identify};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger;
+use tactus_link::Request;
 
 use crate::common::{boot, elf};
 use crate::explore::world;

@@ -1,16 +1,16 @@
 //! A kitchen scale's weights on a rig's lifted finger, as `device calibrate --weights` asks for them, and an accelerometer that is turned
 //! over, with the image that is flashed.
 
-use tactus::link::Request;
-use tactus::sim::parts::PartFault;
-use tactus::sim::person::{Hand, Manner};
-use tactus::sim::world::Setup;
 use tactus_core::handheld::weights::WEIGHTS_MN;
 use tactus_core::rig::weigh::ForceScale;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Prompt, Report};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
+use tactus_link::Request;
+use tactus_world::parts::PartFault;
+use tactus_world::person::{Hand, Manner};
+use tactus_world::world::Setup;
 
 use crate::common::{elf_of, ready};
 

@@ -16,7 +16,7 @@ use crate::toolchain::{self, BROWSER};
 /// The crate, from the top.
 pub(super) const CRATE: &str = "host-tools/page";
 /// What the page's world was learned from: it stands beside the module in the page.
-const TRIALS: &str = "host-tools/src/live/world-1.trials";
+const TRIALS: &str = "host-tools/lab/src/live/world-1.trials";
 /// The module is downloaded by whoever opens the page.
 const MOST_BYTES: usize = 1_500_000;
 

@@ -110,8 +110,8 @@ impl Probe {
         let _ = std::fs::remove_file(&file);
         let mut serves = cargo();
         // as the step of the tests has built it
-        serves.args(["test", "--workspace", "--test", "device", "--"]);
-        serves.args(["page::serves_a_page", "--exact", "--nocapture"]);
+        serves.args(["test", "--workspace", "--test", "command", "--"]);
+        serves.args(["device::page::serves_a_page", "--exact", "--nocapture"]);
         serves.env("TACTUS_PAGE_PORT", &file).stdin(Stdio::piped());
         let child = serves.spawn().context("cannot start cargo")?;
         let mut probe = Self {
@@ -167,7 +167,14 @@ fn reference() -> Result<PathBuf> {
     let file = target().join("page-native.jsonl");
     // as the step of the tests has built it
     let mut native = cargo();
-    native.args(["test", "--workspace", "--test", "page", "--", "replies"]);
+    native.args([
+        "test",
+        "--workspace",
+        "--test",
+        "core_and_lab",
+        "--",
+        "page::replies",
+    ]);
     run(native.env("TACTUS_PAGE_REPLIES", &file))?;
     Ok(file)
 }
@@ -177,8 +184,8 @@ fn files() -> Result<PathBuf> {
     let folder = target().join("page-files");
     // as the step of the tests has built it
     let mut writes = cargo();
-    writes.args(["test", "--workspace", "--test", "opened", "--"]);
-    writes.args(["leaves_files_for_a_page", "--exact"]);
+    writes.args(["test", "--workspace", "--test", "command", "--"]);
+    writes.args(["opened::leaves_files_for_a_page", "--exact"]);
     run(writes.env("TACTUS_PAGE_FILES", &folder))?;
     Ok(folder)
 }

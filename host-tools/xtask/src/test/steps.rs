@@ -73,6 +73,14 @@ pub(super) const STEPS: [Step; 15] = [
             "--package",
             "tactus-core",
             "--package",
+            "tactus-link",
+            "--package",
+            "tactus-world",
+            "--package",
+            "tactus-lab",
+            "--package",
+            "tactus-study",
+            "--package",
             "tactus-probe",
         ]);
         tests.args(["--lib", "--bins", "--no-fail-fast"]);

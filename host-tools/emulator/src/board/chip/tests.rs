@@ -4,10 +4,10 @@ use std::sync::{Arc, Mutex};
 
 use rigless::emulator::{Error, Memory};
 use rigless::soc::Width;
-use tactus::sim::encoder::Cut;
-use tactus::sim::faults::Fault;
-use tactus::sim::world::{Setup, World};
 use tactus_core::sensor::FingerName;
+use tactus_world::encoder::Cut;
+use tactus_world::faults::Fault;
+use tactus_world::world::{Setup, World};
 
 use super::*;
 use crate::board::options::Options;

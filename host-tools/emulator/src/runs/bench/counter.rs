@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use tactus::sim::world::Setup;
 use tactus_core::dsp::{Plain, Plan};
+use tactus_world::world::Setup;
 
 use super::error::BenchError;
 use super::workload::{self, Counter, Workload};

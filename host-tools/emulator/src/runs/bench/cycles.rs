@@ -4,10 +4,10 @@
 use std::num::NonZeroU64;
 use std::path::Path;
 
-use tactus::link::Request;
-use tactus::sim::world::Setup;
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::wire::{Command, Counts, Event, Identify, Phase};
+use tactus_link::Request;
+use tactus_world::world::Setup;
 
 use crate::board::cycles::{CycleProfile, Load, Spent};
 use crate::board::{Emulator, Options, Timing};

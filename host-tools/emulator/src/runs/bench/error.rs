@@ -1,7 +1,7 @@
 //! Why nothing is counted.
 
-use tactus::data::recordings::RecordingError;
-use tactus::eval::learn::TableError as LearnError;
+use tactus_lab::data::recordings::RecordingError;
+use tactus_lab::eval::learn::TableError as LearnError;
 
 use crate::board;
 use crate::host::talk::TalkError;
@@ -26,7 +26,7 @@ pub(crate) enum BenchError {
     /// The curves.
     #[cfg(feature = "plot")]
     #[error(transparent)]
-    Draw(#[from] tactus::eval::chart::DrawError),
+    Draw(#[from] tactus_study::chart::DrawError),
     #[error(transparent)]
     Write(#[from] crate::host::args::WriteError),
     #[cfg(not(feature = "plot"))]

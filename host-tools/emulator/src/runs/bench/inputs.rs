@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::data::recording::PAC_RATE_HZ;
-use tactus::data::recordings::RecordingSet;
-use tactus::eval::learn;
 use tactus_core::explorer::kernels::MOST_SQUARE;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{
     FeatureSet, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet,
 };
 use tactus_core::table::{Action, Contents, Table};
+use tactus_lab::data::recording::PAC_RATE_HZ;
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::eval::learn;
 
 use super::counter::Bench;
 use super::error::BenchError;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use tactus::sim::world::Setup;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Identify, Phase};
+use tactus_world::world::Setup;
 
 use super::cycles::{CORE_HZ, Cycles};
 use super::error::BenchError;

@@ -11,7 +11,7 @@ pub(super) type Curve = (&'static str, Vec<(f64, f64)>);
 #[cfg(feature = "plot")]
 pub(super) fn draw(path: &Path, curves: &[Curve]) -> Result<(), BenchError> {
     let title = "A fused decision after a slide, three movements";
-    let svg = tactus::eval::chart::curves(title, "textures of the table", "", curves)?;
+    let svg = tactus_study::chart::curves(title, "textures of the table", "", curves)?;
     std::fs::write(path, svg).map_err(|source| {
         let path = path.into();
         BenchError::Write(crate::host::args::WriteError { path, source })

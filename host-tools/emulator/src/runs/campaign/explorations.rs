@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use tactus::eval::evaluate::Method;
-use tactus::sim::collection::Collection;
-use tactus::sim::recorded::RecordedTexture;
 use tactus_core::wire::Identify;
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::sim::collection::Collection;
+use tactus_lab::sim::recorded::RecordedTexture;
 
 use crate::board::Options;
 use crate::host::exploration::{Exploration, ExploreError, explore};

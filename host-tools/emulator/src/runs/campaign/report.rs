@@ -1,8 +1,8 @@
 //! The campaign's result in words and in JSON.
 
 use serde_json::{Value, json};
-use tactus::eval::evaluate::Method;
-use tactus::eval::show::count;
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::eval::show::count;
 
 use super::explorations::{Bars, Results};
 use crate::host::exploration::{Exploration, FORCE_N, FORCE_SHARE, JITTER_US, SPEED_SHARE};

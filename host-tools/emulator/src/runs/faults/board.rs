@@ -6,20 +6,20 @@ use std::path::Path;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::link::Request;
-use tactus::sim::fault_case::naming::{self, Naming};
-use tactus::sim::fault_case::{
-    Activity, Case, HOMINGS, LIFTED_N, SHARE, STANDS_MM_S, STILL_MM, STILL_MS, frees_the_finger,
-    world,
-};
-use tactus::sim::faults::Fault;
-use tactus::sim::mount::Mount;
-use tactus::sim::press::FORCE_LIMIT_N;
 use tactus_core::rig::Fault as Named;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::PressureSensor as _;
 use tactus_core::sensor::biotac::BioTac;
 use tactus_core::wire::{Command, Event, Identify, Phase, Report};
+use tactus_lab::sim::fault_case::naming::{self, Naming};
+use tactus_lab::sim::fault_case::{
+    Activity, Case, HOMINGS, LIFTED_N, SHARE, STANDS_MM_S, STILL_MM, STILL_MS, frees_the_finger,
+    world,
+};
+use tactus_lab::sim::press::FORCE_LIMIT_N;
+use tactus_link::Request;
+use tactus_world::faults::Fault;
+use tactus_world::mount::Mount;
 
 use crate::board::{Emulator, Error, Options, Output, Reset, ResetCause};
 use crate::host::talk::{TIMEOUT_S, Talk, TalkError};

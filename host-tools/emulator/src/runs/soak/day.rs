@@ -6,15 +6,15 @@ use embassy_futures::block_on;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
-use tactus::sim::collection::{calibrated, texture_name};
-use tactus::sim::flash::{RamFlash, TABLE};
-use tactus::sim::mount::Mount;
-use tactus::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
-use tactus::sim::rig::{SimError, SimRig};
 use tactus_core::dsp::{self, Plain};
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::wire::{Command, Event, Forget, Identify, MemoryError, Text, Verdict, text};
+use tactus_lab::sim::collection::{calibrated, texture_name};
+use tactus_lab::sim::flash::{RamFlash, TABLE};
+use tactus_lab::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
+use tactus_lab::sim::rig::{SimError, SimRig};
+use tactus_world::mount::Mount;
 
 use super::episodes::{Episodes, FACTORY, HOMINGS, MOST_N, Plan, world};
 

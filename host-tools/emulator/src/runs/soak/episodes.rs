@@ -9,11 +9,11 @@ use rand::RngExt as _;
 use rand::seq::IndexedRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
-use tactus::eval::show::count;
-pub(super) use tactus::sim::fault_case::{HOMINGS, world};
-use tactus::sim::faults::Fault;
 use tactus_core::table::factory;
 use tactus_core::wire::Identify;
+use tactus_lab::eval::show::count;
+pub(super) use tactus_lab::sim::fault_case::{HOMINGS, world};
+use tactus_world::faults::Fault;
 
 /// More force than this is never on the finger, N: see the guard of the core's `rig`.
 pub(crate) const MOST_N: f64 = 2.2;

@@ -5,11 +5,11 @@ use std::path::Path;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus::link::{ReadTable, Request};
-use tactus::sim::collection::{calibrated, texture_name};
-use tactus::sim::mount::Mount;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Command, Counts, Event, Forget, Report, Reset, Status};
+use tactus_lab::sim::collection::{calibrated, texture_name};
+use tactus_link::{ReadTable, Request};
+use tactus_world::mount::Mount;
 
 use super::episodes::{HOMINGS, Plan, world};
 use super::hour_report::{Hour, HourError, Restart, missed};

@@ -1,10 +1,10 @@
 //! What became of an hour on the emulated board, and what it must be.
 
 use serde_json::{Value, json};
-use tactus::eval::show::count;
-use tactus::sim::rig::SimError;
 use tactus_core::table::TableError;
 use tactus_core::wire::Reset;
+use tactus_lab::eval::show::count;
+use tactus_lab::sim::rig::SimError;
 
 use super::episodes::{Episodes, MOST_N};
 use crate::board::Error;

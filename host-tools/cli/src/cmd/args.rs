@@ -1,0 +1,233 @@
+//! Arguments that several commands take.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use tactus_core::explorer::{self, Config, SlideTime, Strategy};
+use tactus_core::features::FeatureSet;
+use tactus_core::table::{Drift, MAX_LENGTHS, is_false_alarm};
+use tactus_lab::eval::evaluate::Method;
+
+use super::config;
+use super::output::UsageError;
+
+#[derive(Args, Clone)]
+pub(crate) struct Recordings {
+    /// Folder of recordings; that of TACTUS_RECORDINGS or of tactus.toml unless given
+    #[arg(long, value_name = "DIR")]
+    pub(crate) recordings: Option<PathBuf>,
+}
+
+impl Recordings {
+    /// The folder that was given, or that the environment names.
+    ///
+    /// # Errors
+    /// Neither does.
+    pub(crate) fn folder(&self) -> Result<PathBuf, UsageError> {
+        let folder = self.recordings.clone();
+        folder.or_else(config::recordings).ok_or_else(|| {
+            let say = "give a folder of recordings: --recordings DIR, TACTUS_RECORDINGS in the environment, or `recordings` in tactus.toml";
+            UsageError(say.to_owned())
+        })
+    }
+}
+
+#[derive(Args, Clone)]
+pub(crate) struct Stop {
+    /// Stop when a texture is more probable than this
+    #[arg(long, default_value_t = 0.99, value_parser = probability)]
+    pub(crate) threshold: f32,
+    /// Stop after this many slides
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=254))]
+    pub(crate) max_slides: u8,
+    /// Share of the known textures that may be taken for new ones, such as 0.02; the table's own unless given
+    #[arg(long, value_name = "SHARE", value_parser = false_alarm)]
+    pub(crate) false_alarm: Option<f32>,
+}
+
+/// What a fused table that is learned expects.
+#[derive(Args, Clone)]
+pub(crate) struct Expecting {
+    /// How much fingers and samples change from one session to the next, for a table that is learned with the method fused:
+    /// standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and samples that
+    /// stay where they are
+    #[arg(long, value_name = "BANDS,TRACTION|0", default_value = "0.1,0.04", value_parser = drift)]
+    pub(crate) drift: Drift,
+}
+
+fn drift(text: &str) -> Result<Drift, String> {
+    let number = |text: &str| text.trim().parse::<f32>().ok();
+    let drift = match text.split_once(',') {
+        Some((bands, traction)) => number(bands)
+            .zip(number(traction))
+            .map(|(bands, traction)| Drift { bands, traction }),
+        None => number(text)
+            .filter(|none| *none == 0.0)
+            .map(|_| Drift::NONE),
+    };
+    drift.filter(|drift| drift.is_possible()).ok_or_else(|| {
+        "two numbers from 0 to 10, such as 0.1,0.04, or 0 for no drift at all".to_owned()
+    })
+}
+
+/// When a slide may end before its end.
+#[derive(Args, Clone)]
+pub(crate) struct Ending {
+    /// With --early: the lengths at which a slide may end, s at constant speed
+    #[arg(long, value_name = "S,S,...", value_delimiter = ',', default_value = "1,2,3", requires = "early", value_parser = length)]
+    pub(crate) lengths: Vec<u16>,
+    /// With --early: how improbable all other textures together have to be; several are tried one after the other
+    #[arg(long, value_name = "P,P,...", value_delimiter = ',', requires = "early", value_parser = doubt)]
+    pub(crate) doubt: Vec<f64>,
+}
+
+impl Ending {
+    /// The lengths in ms.
+    ///
+    /// # Errors
+    /// See [`rising`].
+    pub(crate) fn lengths_ms(&self) -> Result<Vec<u16>, UsageError> {
+        rising(&self.lengths)
+    }
+}
+
+/// Lengths as a table has them.
+///
+/// # Errors
+/// They are too many, or one is not longer than the one before.
+pub(crate) fn rising(lengths_ms: &[u16]) -> Result<Vec<u16>, UsageError> {
+    if lengths_ms.len() > MAX_LENGTHS || !lengths_ms.is_sorted_by(|a, b| a < b) {
+        let say = format!("--lengths: at most {MAX_LENGTHS}, the shortest first, such as 1,2,3");
+        return Err(UsageError(say));
+    }
+    Ok(lengths_ms.to_vec())
+}
+
+/// A length in s, as ms.
+pub(crate) fn length(text: &str) -> Result<u16, String> {
+    match text.trim().parse::<f64>() {
+        Ok(s) if (0.3..=60.0).contains(&s) => Ok((s * 1e3).round() as u16),
+        _ => Err("seconds from 0.3 to 60, such as 1.5".to_owned()),
+    }
+}
+
+fn doubt(text: &str) -> Result<f64, String> {
+    match text.trim().parse() {
+        Ok(p) if 0.0 < p && p < 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1, such as 0.001".to_owned()),
+    }
+}
+
+pub(crate) fn false_alarm(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(share) if is_false_alarm(share) => Ok(share),
+        _ => Err("a share from 0.0005 to 0.2, such as 0.02".to_owned()),
+    }
+}
+
+impl Stop {
+    pub(crate) fn config(&self, method: Method) -> Config {
+        Config {
+            method: method.method(),
+            strategy: method.strategy(),
+            threshold: self.threshold,
+            max_slides: self.max_slides,
+            open: false,
+            false_alarm: self.false_alarm,
+            ..Config::default()
+        }
+    }
+}
+
+fn probability(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(p) if 0.0 < p && p <= 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1, such as 0.99; 1 is never exceeded".to_owned()),
+    }
+}
+
+/// What a fused table is learned from.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Features {
+    /// Traction and twelve band powers
+    Force,
+    /// Mean and standard deviation of P_DC, and the band powers: for a rig without force sensing
+    Pressure,
+    /// The band powers alone
+    Bands,
+    /// The three properties of the paper
+    Properties,
+}
+
+impl Features {
+    pub(crate) fn set(self) -> FeatureSet {
+        match self {
+            Self::Force => FeatureSet::Force,
+            Self::Pressure => FeatureSet::Pressure,
+            Self::Bands => FeatureSet::Bands,
+            Self::Properties => FeatureSet::Properties,
+        }
+    }
+}
+
+/// What the next movement is chosen for.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Objective {
+    /// The greatest benefit, whatever it takes
+    Bits,
+    /// The most bits per second: a slow slide has to tell more
+    BitsPerSecond,
+}
+
+/// What movements are chosen for, by a method that looks ahead.
+#[derive(Args, Clone)]
+pub(crate) struct Choosing {
+    /// What to choose the next movement for, and say how long explorations take
+    #[arg(long, value_enum)]
+    pub(crate) objective: Option<Objective>,
+    /// With --objective, what a slide takes besides the time at its speed: approach, pressing, lifting, s; that of the reference
+    /// rig unless given, 2 with --fabrics
+    #[arg(long, value_name = "S", requires = "objective", value_parser = overhead)]
+    pub(crate) overhead: Option<f32>,
+}
+
+fn overhead(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(s) if (0.0..=600.0).contains(&s) => Ok(s),
+        _ => Err("seconds from 0 to 600, such as 4".to_owned()),
+    }
+}
+
+impl Choosing {
+    /// How long slides take, where that was asked for; `usual`, but for the overhead.
+    pub(crate) fn time(&self, usual: SlideTime) -> Option<SlideTime> {
+        self.objective?;
+        let overhead_s = self.overhead.unwrap_or(usual.overhead_s);
+        Some(SlideTime {
+            overhead_s,
+            ..usual
+        })
+    }
+
+    /// The same exploration, with this objective.
+    ///
+    /// # Errors
+    /// The method does not look ahead.
+    pub(crate) fn config(&self, config: Config, usual: SlideTime) -> Result<Config, UsageError> {
+        let time = self.time(usual);
+        if time.is_some() && config.strategy != Strategy::Bayesian {
+            let say =
+                "--objective needs a method that looks ahead: fused, student-all, student or paper";
+            return Err(UsageError(say.to_owned()));
+        }
+        let by_rate = time.filter(|_| self.objective == Some(Objective::BitsPerSecond));
+        let objective = by_rate.map_or(
+            explorer::Objective::Bits,
+            explorer::Objective::BitsPerSecond,
+        );
+        Ok(Config {
+            objective,
+            ..config
+        })
+    }
+}

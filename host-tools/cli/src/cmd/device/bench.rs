@@ -1,0 +1,341 @@
+//! A probe that somebody works with at a terminal: its line, the log of what is said, questions, and Ctrl-C, which leaves the rig lifted
+//! and stopped.
+
+use std::io::{self, Write};
+use std::pin::{Pin, pin};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::task::Poll;
+use std::time::Duration;
+
+use tactus_core::wire::{Event, Report, Status};
+use tactus_link::bringup::Trouble;
+use tactus_link::lifting::Stopped;
+use tactus_link::line::Line;
+use tactus_link::lock::PortLock;
+use tactus_link::log;
+use tactus_link::person::{Question, QuestionKind};
+use tactus_link::probe::{GREETING, TIMEOUT};
+use tactus_link::{OperationError, Port, Probe, Transaction};
+
+use super::history::History;
+use super::line::{Emulator, OpenError, Where};
+use super::log::Log;
+use super::loss::{Consent, can_be_asked};
+use crate::cmd::output::Format;
+
+/// An emulated board may go slower than real time.
+const EMULATED: Duration = Duration::from_secs(30);
+
+/// An error at the bench, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BenchError {
+    /// There is no line.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// An operation failed, or was stopped.
+    #[error(transparent)]
+    Operation(#[from] OperationError),
+    /// The log cannot be written.
+    #[error("{0}; the rig was stopped and lifted")]
+    Log(io::Error),
+    /// A bring-up did not reach its end.
+    #[error(transparent)]
+    BringUp(#[from] Trouble),
+    /// There can be no log, or what is shown cannot be written.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// Nobody can be asked.
+    #[error("nothing was changed: there is nobody to ask; add --yes to do it")]
+    Nobody,
+}
+
+impl BenchError {
+    /// Returns true where the user had it stopped: what a shell takes for Ctrl-C.
+    pub(crate) fn is_interrupt(&self) -> bool {
+        matches!(
+            self,
+            Self::Operation(OperationError::Stopped(_)) | Self::BringUp(Trouble::Quit)
+        )
+    }
+}
+
+/// Ctrl-C, a closed terminal, `kill`: seen when somebody looks.
+#[derive(Clone, Default)]
+pub(crate) struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// From now on they do not end the program by themselves.
+    pub(crate) fn catch() -> io::Result<Self> {
+        let interrupt = Self::default();
+        use signal_hook::consts::{SIGINT, SIGTERM};
+        #[cfg(unix)]
+        let signals = [SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
+        #[cfg(not(unix))]
+        let signals = [SIGINT, SIGTERM];
+        for signal in signals {
+            signal_hook::flag::register(signal, Arc::clone(&interrupt.0))?;
+        }
+        Ok(interrupt)
+    }
+
+    /// Whether there was one since this was asked last.
+    pub(crate) fn take(&self) -> bool {
+        self.0.swap(false, Relaxed)
+    }
+}
+
+/// A probe that somebody works with.
+pub(crate) struct Bench {
+    port: Port<Box<dyn Line>>,
+    probe: Probe,
+    pub(crate) name: String,
+    interrupt: Interrupt,
+    log: Option<Log>,
+    history: History,
+    format: Format,
+    consent: Consent,
+    /// the file that the probe's table was kept in
+    backup: Option<String>,
+    /// what failed here while an operation is being stopped
+    failed: Option<BenchError>,
+    /// ends last
+    _emulator: Option<Emulator>,
+    _lock: Option<PortLock>,
+}
+
+impl Bench {
+    /// Opens the line and waits until the probe has its table: it may have had its power just now.
+    pub(crate) fn open(place: &Where, format: Format) -> Result<(Self, Status), BenchError> {
+        let interrupt = Interrupt::catch()?;
+        let open = place.open()?;
+        let log = place.log.as_ref().map(|path| Log::create(path, &open.name));
+        let (greeting, timeout) = match open.emulator {
+            Some(_) => (EMULATED, EMULATED),
+            None => (GREETING, TIMEOUT),
+        };
+        let probe = Probe::new(&open.name, greeting, timeout);
+        let mut bench = Self {
+            port: Port::new(open.line, probe.clone()),
+            probe: probe.clone(),
+            interrupt,
+            log: log.transpose()?,
+            history: History::of(&open.name),
+            format,
+            consent: Consent::default(),
+            backup: None,
+            failed: None,
+            name: open.name,
+            _emulator: open.emulator,
+            _lock: open.lock,
+        };
+        let status = bench.done(probe.hello(), &mut io::sink())?;
+        Ok((bench, status))
+    }
+
+    /// The probe, for operations.
+    pub(crate) fn probe(&self) -> Probe {
+        self.probe.clone()
+    }
+
+    /// From now on something may be taken from the probe like this.
+    pub(crate) fn consents(&mut self, consent: &Consent) {
+        self.consent = consent.clone();
+    }
+
+    /// The file that the probe's table was kept in before something was lost.
+    pub(crate) fn backup(&self) -> Option<String> {
+        self.backup.clone()
+    }
+
+    /// Frames that were damaged, and reports that were lost on the line.
+    pub(crate) fn losses(&self) -> (u64, u64) {
+        self.probe.losses()
+    }
+
+    /// What this PC remembers of the probe.
+    pub(crate) fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Ctrl-C, for those who wait for something else than the probe.
+    pub(crate) fn interrupt(&self) -> &Interrupt {
+        &self.interrupt
+    }
+
+    /// Does an operation, and prints its words where they are for people. Whatever ends it early leaves the rig stopped and lifted.
+    pub(crate) fn done<T>(
+        &mut self,
+        operation: impl Future<Output = Result<T, OperationError>>,
+        out: &mut dyn Write,
+    ) -> Result<T, BenchError> {
+        let mut operation = pin!(operation);
+        loop {
+            if let Poll::Ready(done) = self.poll(operation.as_mut(), out, &mut |_| ()) {
+                return done;
+            }
+            if self.interrupt.take() {
+                eprintln!("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");
+                self.probe.interrupt();
+            }
+        }
+    }
+
+    /// Polls an operation once, and does what it needs meanwhile; `each` gets the reports that came.
+    pub(crate) fn poll<T, F>(
+        &mut self,
+        operation: Pin<&mut F>,
+        out: &mut dyn Write,
+        each: &mut dyn FnMut(&Report),
+    ) -> Poll<Result<T, BenchError>>
+    where
+        F: Future<Output = Result<T, OperationError>> + ?Sized,
+    {
+        let polled = self.port.poll(operation);
+        self.keep_log(each);
+        let words = self.probe.take_words();
+        if self.format == Format::Text && !words.is_empty() {
+            let shown = out.write_all(&words).and_then(|()| out.flush());
+            shown.unwrap_or_else(|why| self.fails(why.into()));
+        }
+        if let Some(backup) = self.probe.backup() {
+            let kept = self.consent.keep(&backup.name, &backup.bytes);
+            let kept = kept.inspect(|file| self.backup = Some(file.clone()));
+            self.probe.kept(
+                kept.map(|file| format!("`tactus device table push {file}` brings it back.")),
+            );
+        }
+        if let Some(question) = self.probe.question() {
+            match self.ask(&question, out) {
+                Ok(Some(yes)) => self.probe.answer(yes),
+                Ok(None) => self.probe.stop(),
+                Err(why) => self.fails(why),
+            }
+        }
+        let Poll::Ready(done) = polled else {
+            return Poll::Pending;
+        };
+        Poll::Ready(match self.failed.take() {
+            Some(why) => Err(why),
+            None => Ok(done?),
+        })
+    }
+
+    /// Nothing more can be done; the rig is stopped and lifted first.
+    fn fails(&mut self, why: BenchError) {
+        self.failed.get_or_insert(why);
+        self.probe.stop();
+    }
+
+    fn keep_log(&mut self, each: &mut dyn FnMut(&Report)) {
+        for line in self.probe.said() {
+            if let Some(log) = &mut self.log {
+                log.line(&line);
+            }
+            let log::Line::Report(report) = &line else {
+                continue;
+            };
+            self.history.hear(report);
+            if let Event::Chosen {
+                slide, movement, ..
+            } = &report.event
+            {
+                tracing::info!(slide, %movement, "the probe chooses");
+            }
+            each(report);
+        }
+        if let Some(Err(why)) = self.log.as_mut().map(Log::flush) {
+            self.log = None;
+            self.fails(BenchError::Log(why));
+        }
+    }
+
+    /// Asks who sits at the terminal; `None` is Ctrl-C or the end of the input.
+    fn ask(&self, question: &Question, out: &mut dyn Write) -> Result<Option<bool>, BenchError> {
+        let Question { said, asked, kind } = question;
+        let prompt = match kind {
+            QuestionKind::Consent => {
+                match self.format {
+                    Format::Text => writeln!(out, "{said}")?,
+                    Format::Json => eprintln!("{said}"),
+                }
+                out.flush()?;
+                if self.consent.yes {
+                    return Ok(Some(true));
+                }
+                can_be_asked(false)?;
+                format!("{asked} [y/N] ")
+            }
+            QuestionKind::Moved => format!("{asked}, then press Enter (n: it stays): "),
+            QuestionKind::Laid => format!("{asked} and press Enter: "),
+            QuestionKind::LaidOrLeftOut => {
+                format!("{asked} and press Enter, or s to leave it out: ")
+            }
+        };
+        let answer = read_answer(&self.interrupt, &prompt)?;
+        Ok(answer.map(|answer| {
+            let answer = answer.trim().to_lowercase();
+            match kind {
+                QuestionKind::Consent => matches!(&answer[..], "y" | "yes"),
+                QuestionKind::Moved => !matches!(&answer[..], "n" | "no" | "s"),
+                QuestionKind::Laid => true,
+                QuestionKind::LaidOrLeftOut => answer != "s",
+            }
+        }))
+    }
+
+    /// Does one request.
+    pub(crate) fn get<E: Transaction>(&mut self, transaction: E) -> Result<E::Outcome, BenchError> {
+        let probe = self.probe();
+        self.done(probe.get(transaction), &mut io::sink())
+    }
+
+    /// The table that the probe uses.
+    pub(crate) fn table(&mut self) -> Result<Arc<[u8]>, BenchError> {
+        let probe = self.probe();
+        self.done(probe.table(), &mut io::sink())
+    }
+
+    /// Reads once while nothing is asked for.
+    pub(crate) fn listen(&mut self, each: &mut dyn FnMut(&Report)) -> Result<(), BenchError> {
+        let probe = self.probe();
+        let mut heard = pin!(async { probe.listen().map(drop) });
+        self.port.turn(true);
+        let listened = self.poll(heard.as_mut(), &mut io::sink(), each);
+        match listened {
+            Poll::Ready(listened) => listened,
+            Poll::Pending => Ok(()),
+        }
+    }
+
+    /// Stops whatever is done, and waits until the finger is lifted and nothing moves. A second Ctrl-C ends the waiting.
+    pub(crate) fn lift(&mut self) -> Result<Stopped, BenchError> {
+        let probe = self.probe();
+        self.done(probe.lift(), &mut io::sink())
+    }
+}
+
+/// Asks, and waits for a line; `None`: Ctrl-C or the end of the input.
+fn read_answer(interrupt: &Interrupt, prompt: &str) -> io::Result<Option<String>> {
+    eprint!("{prompt}");
+    let (entered, enter) = mpsc::channel();
+    // a blocking read does not see Ctrl-C; the thread ends with the program
+    std::thread::spawn(move || {
+        let mut line = String::new();
+        let read = io::stdin().read_line(&mut line);
+        // nobody waits any more after Ctrl-C
+        let _ = entered.send(read.map(|bytes| (bytes > 0).then_some(line)));
+    });
+    loop {
+        if interrupt.take() {
+            return Ok(None);
+        }
+        match enter.recv_timeout(Duration::from_millis(100)) {
+            Ok(line) => return line,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! `tactus device bringup`: a new rig's first evening, with the self-test image.
+
+use std::io::{self, BufRead as _, IsTerminal as _, Read as _, Write};
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use anyhow::bail;
+use tactus_core::wire::bringup::{Measure, Pin, Saw};
+use tactus_core::wire::{Command, Report as Told, Reset};
+use tactus_link::Request;
+use tactus_link::bringup::{
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Owner, Person, Probe, Report, STEPS,
+    Step, Trouble, judge,
+};
+
+use super::bench::{Bench, BenchError, Interrupt};
+use super::line::{Open, Where};
+use crate::cmd::output::{Format, print_json};
+
+/// Bring up a new rig: check its parts and wires step by step, and name what is wrong
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  cargo xtask flash --self-test            the image that measures; it stays on the board until it has passed
+  tactus device bringup                    goes on where it stopped last time
+  tactus device bringup --list             the steps, and what is right in each
+  tactus device bringup --report rig2      another rig
+
+Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each step that is over is
+kept in DIR/journal.jsonl; DIR/report.txt, report.json and the curves beside them are to be sent to somebody who helps.
+Ctrl-C stops whatever moves; the exit code is 130 then. It is 1 while a step has not passed.")]
+pub(crate) struct Args {
+    /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, of tactus.toml, or the only NUCLEO that is plugged in, unless given
+    #[arg(long, value_name = "PORT")]
+    port: Option<String>,
+    /// Folder of the journal and of the report
+    #[arg(long, value_name = "DIR", default_value = "bringup")]
+    report: PathBuf,
+    /// List the steps, and what has passed in DIR, without a board
+    #[arg(long)]
+    list: bool,
+    /// How to print the report
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// A board that starts answers within this.
+const STARTS: Duration = Duration::from_secs(60);
+/// It asks for a squeeze for 30 s; the lever's longest way takes 8 s.
+const ANSWERS: Duration = Duration::from_secs(40);
+/// A question that moves nothing is asked again after this, so often.
+const AGAIN: Duration = Duration::from_secs(4);
+const TRIES: u32 = 3;
+/// The board listens for a second when it starts.
+const HELLO: Duration = Duration::from_millis(200);
+
+/// Goes through the steps.
+pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    if how.list {
+        let journal = how.report.join("journal.jsonl");
+        return list(
+            journal
+                .exists()
+                .then(|| Journal::open(&journal))
+                .transpose()?,
+            out,
+        );
+    }
+    std::fs::create_dir_all(&how.report)?;
+    let mut journal = Journal::open(&how.report.join("journal.jsonl"))?;
+    let interrupt = Interrupt::catch()?;
+    let place = Where {
+        port: how.port.clone(),
+        ..Where::default()
+    };
+    let mut person = Terminal {
+        interrupt: interrupt.clone(),
+        lines: lines(),
+    };
+    let done = if bringup::next_image(&journal) == Some(Image::Rig) {
+        let (bench, _) = Bench::open(&place, Format::Text)?;
+        let mut linked = Linked(bench);
+        bringup::run(Ends::Rig(&mut linked), &mut person, &mut journal)
+    } else {
+        let open = place.open().map_err(BenchError::from)?;
+        let mut board = Serial {
+            open,
+            line: Line::default(),
+            interrupt,
+        };
+        eprintln!(
+            "Looking for the self-test. If nothing comes in a minute, press the board's black button."
+        );
+        board
+            .hello(STARTS)
+            .and_then(|reset| reset.ok_or(Trouble::Silent))
+            .and_then(|_| bringup::run(Ends::SelfTest(&mut board), &mut person, &mut journal))
+    };
+    let report = Report::new(&journal);
+    report.write(&how.report)?;
+    match how.format {
+        Format::Text => write!(out, "{}", report.text())?,
+        Format::Json => print_json(&report, out)?,
+    }
+    out.flush()?;
+    let folder = how.report.display();
+    eprintln!("The report is in {folder}: report.txt, report.json and curves.");
+    match done.map_err(BenchError::BringUp)? {
+        Ended::Passed => {
+            eprintln!(
+                "All steps have passed. Next: tactus device identify, or tactus device train"
+            );
+        }
+        Ended::Flash(_) => eprintln!(
+            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does the last steps"
+        ),
+        Ended::Failed => bail!("a step has not passed; the same command runs it again"),
+    }
+    Ok(())
+}
+
+/// The rig's firmware at the other end of the link.
+struct Linked(Bench);
+
+impl Probe for Linked {
+    fn ask(
+        &mut self,
+        command: Command,
+        each: &mut dyn FnMut(&Told),
+    ) -> Result<Result<(), String>, Trouble> {
+        let probe = self.0.probe();
+        let done = probe.run(Request::command(command), |report| {
+            each(report);
+            Ok(())
+        });
+        match self.0.done(done, &mut io::sink()) {
+            Ok(()) => Ok(Ok(())),
+            Err(BenchError::Operation(why)) if why.refusal().is_some() => {
+                Ok(Err(why.refusal().unwrap_or_default()))
+            }
+            Err(why) if why.is_interrupt() => Err(Trouble::Quit),
+            Err(why) => Err(io::Error::other(why.to_string()).into()),
+        }
+    }
+}
+
+fn list(journal: Option<Journal>, out: &mut impl Write) -> anyhow::Result<()> {
+    for step in STEPS {
+        let last = journal.as_ref().and_then(|journal| journal.last(step.key));
+        let state = match last {
+            None => "to do",
+            Some(entry) if entry.passed => "passed",
+            Some(_) => "FAILED",
+        };
+        writeln!(
+            out,
+            "{state:<7} {:<13} {}: {}",
+            step.key,
+            step.checks,
+            (step.limit)()
+        )?;
+    }
+    Ok(())
+}
+
+/// The self-test at the other end of a serial line.
+struct Serial {
+    open: Open,
+    line: Line,
+    interrupt: Interrupt,
+}
+
+impl Serial {
+    fn say(&mut self, measure: Measure) -> Result<(), Trouble> {
+        let question = self.line.question(measure)?;
+        self.open.line.write_all(&question)?;
+        Ok(self.open.line.flush()?)
+    }
+
+    /// The answer, if it comes in time. Ctrl-C stops what moves.
+    fn hear(&mut self, wait: Duration) -> Result<Option<Saw>, Trouble> {
+        let until = Instant::now() + wait;
+        let mut bytes = [0; 4096];
+        while Instant::now() < until {
+            if self.interrupt.take() {
+                // whatever comes stops a motor
+                self.say(Measure::Hello)?;
+                return Err(Trouble::Quit);
+            }
+            match self.open.line.read(&mut bytes) {
+                Ok(0) => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
+                Ok(n) => {
+                    let received = bytes.get(..n).unwrap_or_default();
+                    if let Some(saw) = self.line.receive(received)? {
+                        return Ok(Some(saw));
+                    }
+                }
+                Err(why) => match why.kind() {
+                    io::ErrorKind::WouldBlock
+                    | io::ErrorKind::TimedOut
+                    | io::ErrorKind::Interrupted => {}
+                    _ => return Err(why.into()),
+                },
+            }
+        }
+        Ok(None)
+    }
+
+    /// Asks a board that starts who it is, until it answers.
+    fn hello(&mut self, wait: Duration) -> Result<Option<Reset>, Trouble> {
+        let until = Instant::now() + wait;
+        while Instant::now() < until {
+            self.say(Measure::Hello)?;
+            if let Some(Saw::Hello { reset, .. }) = self.hear(HELLO)? {
+                // questions that it has not answered yet: their answers are of other numbers
+                return Ok(Some(reset));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Board for Serial {
+    fn ask(&mut self, measure: Measure) -> Result<Saw, Trouble> {
+        let moves = matches!(
+            measure,
+            Measure::Squeeze
+                | Measure::Lever(_)
+                | Measure::LeverTop
+                | Measure::Stage(_)
+                | Measure::Ramp
+        );
+        // a second question would stop what moves
+        let (tries, wait) = if moves { (1, ANSWERS) } else { (TRIES, AGAIN) };
+        for _ in 0..tries {
+            self.say(measure)?;
+            if let Some(saw) = self.hear(wait)? {
+                return Ok(saw);
+            }
+        }
+        Err(Trouble::Silent)
+    }
+
+    fn restart(&mut self, measure: Measure) -> Result<Option<Reset>, Trouble> {
+        self.say(measure)?;
+        self.hello(Duration::from_secs(10))
+    }
+}
+
+/// Who sits before the terminal.
+struct Terminal {
+    interrupt: Interrupt,
+    lines: Receiver<io::Result<String>>,
+}
+
+/// Lines of the standard input, read in a thread of its own: Ctrl-C is seen meanwhile.
+fn lines() -> Receiver<io::Result<String>> {
+    let (read, lines) = mpsc::channel();
+    std::thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            if read.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    lines
+}
+
+impl Terminal {
+    fn line(&mut self, prompt: &str) -> Result<String, Trouble> {
+        eprint!("  {prompt} ");
+        loop {
+            if self.interrupt.take() {
+                return Err(Trouble::Quit);
+            }
+            match self.lines.recv_timeout(Duration::from_millis(50)) {
+                Ok(line) => {
+                    let line = line?.trim().to_owned();
+                    if !io::stdin().is_terminal() {
+                        eprintln!("{line}");
+                    }
+                    return if line == "q" {
+                        Err(Trouble::Quit)
+                    } else {
+                        Ok(line)
+                    };
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err(Trouble::Quit),
+            }
+        }
+    }
+}
+
+impl Person for Terminal {
+    fn done(&mut self, please: &str) -> Result<(), Trouble> {
+        self.line(&format!("{please}; then Enter.")).map(|_| ())
+    }
+
+    fn watch(&mut self, please: &str) -> Result<(), Trouble> {
+        self.line(&format!("{please} Enter starts it.")).map(|_| ())
+    }
+
+    fn press(&mut self, switch: Pin, pressed: bool) -> Result<(), Trouble> {
+        let place = judge::place(switch);
+        self.done(&match pressed {
+            true => format!("Press {place} by hand, and keep it pressed"),
+            false => "Let it go".to_owned(),
+        })
+    }
+
+    fn squeeze(&mut self) -> Result<(), Trouble> {
+        eprintln!("  Squeeze the finger once between two fingers and lay it down, within 30 s.");
+        Ok(())
+    }
+
+    fn choose(&mut self, question: &str, answers: &[&str]) -> Result<usize, Trouble> {
+        loop {
+            let choices = answers
+                .iter()
+                .zip(1..)
+                .map(|(answer, n)| format!("{n} {answer}"));
+            let choices = choices.collect::<Vec<_>>().join(", ");
+            let line = self.line(&format!("{question} ({choices}):"))?;
+            match line.parse() {
+                Ok(n @ 1..) if n <= answers.len() => return Ok(n - 1),
+                _ => eprintln!("  a number from 1 to {}", answers.len()),
+            }
+        }
+    }
+
+    fn number(&mut self, question: &str, unit: &str) -> Result<f64, Trouble> {
+        loop {
+            let line = self.line(&format!("{question}, {unit}:"))?;
+            match line.replace(',', ".").parse() {
+                Ok(number) if f64::is_finite(number) => return Ok(number),
+                _ => eprintln!("  a number of {unit}"),
+            }
+        }
+    }
+}
+
+impl Owner for Terminal {
+    fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
+        let verdict = if entry.passed { "passed" } else { "FAILED" };
+        eprintln!("{verdict}  {}: {}", step.checks, entry.saw);
+        for mistake in &entry.mistakes {
+            eprintln!(
+                "        {}\n        what to do: {}",
+                mistake.what, mistake.remedy
+            );
+        }
+        Ok(entry.passed)
+    }
+
+    fn now(&self) -> String {
+        let now = time::OffsetDateTime::now_utc();
+        let (year, month, day) = now.to_calendar_date();
+        let (hour, minute, second) = now.to_hms();
+        let month = u8::from(month);
+        format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+    }
+}

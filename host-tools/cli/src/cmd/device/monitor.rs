@@ -1,0 +1,227 @@
+//! `tactus device monitor`: the probe live on a terminal.
+//!
+//! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
+//! together.
+
+mod film;
+mod keys;
+mod state;
+mod view;
+
+use std::collections::VecDeque;
+use std::io::{self, IsTerminal as _};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::Poll;
+use std::time::{Duration, Instant};
+
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event;
+use tactus_core::table::Table;
+use tactus_core::wire::{Command, Identify, Report};
+use tactus_link::lifting::Stopped;
+use tactus_link::{LinkError, OperationError, PortError, Probe, Request};
+
+pub(super) use self::film::film;
+use self::keys::Act;
+use self::state::{Monitor, Weight};
+use super::bench::{Bench, BenchError};
+use super::identify::Args;
+use crate::cmd::output::Format;
+
+/// How often the screen is drawn, and the probe asked how it is.
+const DRAWN: Duration = Duration::from_millis(100);
+const ASKED: Duration = Duration::from_secs(1);
+/// The monitor asks for the status every second, and shows a probe as silent that says nothing for so long.
+const SILENT: Duration = Duration::from_secs(3);
+
+/// A request under way; the table that it read.
+type Doing = Pin<Box<dyn Future<Output = Result<Option<Arc<[u8]>>, OperationError>>>>;
+
+fn begin(probe: Probe, command: Command) -> Doing {
+    Box::pin(async move {
+        match command {
+            Command::ReadTable(_) => probe.table().await.map(Some),
+            command => {
+                let done = probe.get(Request::command(command)).await;
+                done.map(|()| None)
+            }
+        }
+    })
+}
+
+/// How the user ended it.
+enum End {
+    Quit,
+    Interrupt,
+}
+
+/// Watches until the user has enough of it; the rig is stopped and lifted then.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let (mut bench, status) = Bench::open(&args.at, Format::Text)?;
+    let table = bench.table()?;
+    let names = Table::read(&table)?.names().map(str::to_owned);
+    let names: Vec<String> = names.collect();
+    let wanted = args.wanted(&names, &status)?;
+    if !io::stdout().is_terminal() {
+        return Err(io::Error::other(
+            "the monitor needs a terminal; `tactus device identify` writes lines, `--log FILE` a record",
+        )
+        .into());
+    }
+    let mut monitor = Monitor::new(&bench.name, status, names);
+    // whatever happens, a panic too, the terminal is given back as it was
+    let mut terminal = ratatui::try_init()?;
+    let ended = watch(&mut bench, &mut monitor, &mut terminal, &wanted);
+    ratatui::restore();
+    let end = match ended {
+        Ok(end) => end,
+        Err(why @ BenchError::Operation(OperationError::Port { .. })) => return Err(why.into()),
+        Err(why) => {
+            // the line is good
+            let _ = bench.lift();
+            return Err(why.into());
+        }
+    };
+    eprintln!("Stopping and lifting the finger (Ctrl-C: do not wait) ...");
+    match (bench.lift()?, end) {
+        (Stopped::Lifted, End::Quit) => {
+            eprintln!("Stopped: the finger is lifted and the stage stands.");
+            Ok(())
+        }
+        (came, _) => Err(BenchError::Operation(came.into()).into()),
+    }
+}
+
+fn watch(
+    bench: &mut Bench,
+    monitor: &mut Monitor,
+    terminal: &mut DefaultTerminal,
+    wanted: &Identify,
+) -> Result<End, BenchError> {
+    let mut wanted = wanted.clone();
+    let mut to_do: VecDeque<Command> = VecDeque::new();
+    let mut doing: Option<Doing> = None;
+    let mut drawn: Option<Instant> = None;
+    let mut asked: Option<Instant> = None;
+    let mut heard = Instant::now();
+    let probe = bench.probe();
+    probe.send(Command::Stream(true))?;
+    loop {
+        if bench.interrupt().take() {
+            return Ok(End::Interrupt);
+        }
+        let mut hear = |report: &Report| {
+            heard = Instant::now();
+            monitor.hear(report);
+        };
+        let polled = match &mut doing {
+            Some(job) => bench.poll(job.as_mut(), &mut io::sink(), &mut hear),
+            None => bench
+                .listen(&mut hear)
+                .map_or_else(|why| Poll::Ready(Err(why)), |()| Poll::Pending),
+        };
+        match polled {
+            Poll::Ready(Ok(table)) => {
+                doing = None;
+                if let Some(bytes) = table {
+                    monitor.take_table(Table::read(&bytes).map_err(OperationError::from)?);
+                }
+            }
+            Poll::Pending => {}
+            Poll::Ready(Err(BenchError::Operation(OperationError::Port {
+                why: PortError::Link(why),
+                ..
+            }))) if !matches!(why, LinkError::Protocol(_) | LinkError::Foreign) => {
+                // the probe said why, and goes on
+                doing = None;
+                to_do.clear();
+                monitor.note(Weight::Message, why.to_string());
+            }
+            Poll::Ready(Err(why)) => return Err(why),
+        }
+        if let Some(protocol) = monitor.protocol {
+            let why = OperationError::Port {
+                name: bench.name.clone(),
+                why: PortError::Link(LinkError::Protocol(protocol)),
+                moving: false,
+            };
+            return Err(why.into());
+        }
+        if std::mem::take(&mut monitor.rebooted) {
+            probe.send(Command::Stream(true))?;
+        }
+        if doing.is_none()
+            && let Some(command) = to_do.pop_front()
+        {
+            doing = Some(begin(probe.clone(), command));
+        }
+        if asked.is_none_or(|at| at.elapsed() >= ASKED) {
+            asked = Some(Instant::now());
+            probe.send(Command::Status)?;
+        }
+        monitor.silent = Some(heard.elapsed()).filter(|silent| *silent >= SILENT);
+        monitor.losses = bench.losses();
+        if drawn.is_none_or(|at| at.elapsed() >= DRAWN) {
+            drawn = Some(Instant::now());
+            terminal.draw(|frame| view::draw(monitor, frame))?;
+        }
+        if is_gone(&io::stdin()) {
+            return Ok(End::Interrupt);
+        }
+        while event::poll(Duration::ZERO)? {
+            let Some(key) = event::read()?.as_key_press_event() else {
+                continue;
+            };
+            let busy = doing.is_some() || !to_do.is_empty();
+            match keys::press(monitor, key, busy) {
+                Some(Act::Interrupt) => return Ok(End::Interrupt),
+                Some(Act::Quit) => return Ok(End::Quit),
+                Some(Act::Stop) => {
+                    to_do.clear();
+                    probe.send(Command::Stop)?;
+                    monitor.asked(&Command::Stop);
+                }
+                Some(Act::Identify) => {
+                    if monitor.table_crc != monitor.status.table_crc {
+                        to_do.push_back(Command::ReadTable(0));
+                    }
+                    let identify = Command::Identify(wanted.clone());
+                    monitor.asked(&identify);
+                    to_do.push_back(identify);
+                    // the next one begins elsewhere on the sample
+                    wanted.seed = wanted.seed.wrapping_add(1);
+                }
+                Some(Act::Home) => {
+                    monitor.asked(&Command::Home);
+                    to_do.push_back(Command::Home);
+                }
+                Some(Act::Teach(name)) => {
+                    let teach = Command::Label(name);
+                    monitor.asked(&teach);
+                    to_do.push_back(teach);
+                    // what it feels most like now
+                    to_do.push_back(Command::ReadTable(0));
+                }
+                None => {}
+            }
+        }
+    }
+}
+
+/// Whether the terminal has been closed: crossterm would read its end for ever.
+#[cfg(unix)]
+fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let mut polled = [PollFd::new(terminal, PollFlags::IN)];
+    let now = Timespec::default();
+    poll(&mut polled, Some(&now)).is_ok() && polled[0].revents().intersects(PollFlags::HUP)
+}
+
+#[cfg(not(unix))]
+fn is_gone(_: &io::Stdin) -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests;

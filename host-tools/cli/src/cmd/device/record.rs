@@ -1,0 +1,169 @@
+//! `tactus device record`: slides of a real finger in the project's format.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use tactus_lab::data::recording::{Labels, Texture};
+use tactus_lab::data::recordings::RecordingWriter;
+use tactus_lab::eval::show::count;
+use tactus_lab::remote::operations::{self, Wanted};
+use tactus_link::operations::ask_to_lay;
+use tactus_link::person::QuestionKind;
+
+use super::bench::Bench;
+use super::line::Where;
+use super::samples::Sample;
+use super::train::seed_of_now;
+use crate::cmd::output::{Format, print_json};
+
+/// Record slides in the project's format, for `tactus learn` and `tactus evaluate`
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus device record burlap silk --out recordings     asks for the next texture when it is due
+  tactus evaluate --recordings recordings
+  tactus device record burlap silk --out anna --operator Anna --lot 7     what tactus gauge asks for
+  tactus device record burlap silk --out turned --moved     on a turntable; the table learned from it says so
+  tactus device record burlap silk --out there --same-spot  without asking to move the sample
+A slide on the same track again says little about a texture. So at a terminal the rig stops after each slide of all movements of
+the probe's table, its finger lifted, and you are asked to move or turn the sample. What came of that stands beside each slide.
+The same command goes on with the texture at which an interrupted one stopped.")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    at: Where,
+    /// The textures to record, in the order in which they are laid under the finger
+    #[arg(required = true)]
+    textures: Vec<String>,
+    /// The folder to write; it must not hold recordings yet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Slides of each texture; movements of the probe's table take turns
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u8).range(1..=254))]
+    slides: u8,
+    /// Where on the sample slides begin; drawn anew unless given
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Batch or piece that the samples are from, for `tactus gauge`
+    #[arg(long, default_value = "", hide_default_value = true)]
+    lot: String,
+    /// Who makes the slides, for `tactus gauge`
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "",
+        hide_default_value = true
+    )]
+    operator: String,
+    /// Anything else that is to stand beside every slide
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    note: String,
+    #[command(flatten)]
+    sample: Sample,
+    /// How to print what was recorded
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `device record` prints with `--format json`.
+#[derive(Serialize)]
+struct Recorded<'a> {
+    folder: String,
+    textures: usize,
+    /// In the folder, those of an interrupted recording included.
+    slides: usize,
+    lost: Vec<Lost<'a>>,
+}
+
+/// A slide that was made and is not recorded.
+#[derive(Serialize)]
+struct Lost<'a> {
+    texture: &'a str,
+    why: String,
+}
+
+/// Records each texture in turn.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let Args {
+        textures, slides, ..
+    } = args;
+    let named = textures.iter().zip(1..).map(|(name, id)| Texture {
+        id,
+        name: name.trim().to_owned(),
+    });
+    // before anything moves
+    let command = format!(
+        "tactus device record {} --slides {slides}",
+        textures.join(" ")
+    );
+    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let (mut bench, status) = Bench::open(&args.at, args.format)?;
+    writer.label(Labels {
+        lot: args.lot.trim().to_owned(),
+        operator: args.operator.trim().to_owned(),
+        note: args.note.trim().to_owned(),
+        moved: args.sample.said(),
+        finger: status.finger,
+        calibrated: status.calibrated,
+    });
+    let (probe, mut words) = (bench.probe(), bench.probe().words());
+    let (mut written, mut all_lost) = (0, Vec::new());
+    for (index, name) in textures.iter().enumerate() {
+        let there = writer.slides(index);
+        if there == usize::from(*slides) {
+            writeln!(words, "{name}: its slides were recorded before.")?;
+            written += there;
+            continue;
+        }
+        // some of an interrupted recording, where nobody knows how the sample lay
+        writer.forget(index)?;
+        let wanted = Wanted {
+            name,
+            index,
+            slides: *slides,
+            sample: args.sample.known(),
+            seed: args.seed.unwrap_or_else(seed_of_now),
+        };
+        let recorded = async {
+            if textures.len() > 1 {
+                ask_to_lay(&probe, name, QuestionKind::Laid).await?;
+            }
+            operations::record(&probe, &wanted).await
+        };
+        let recorded = bench.done(recorded, out)?;
+        for (slide, moved) in &recorded.slides {
+            writer.moved(*moved);
+            writer.write(slide)?;
+        }
+        written += recorded.slides.len();
+        all_lost.extend(recorded.lost.into_iter().map(|why| Lost {
+            texture: name.trim(),
+            why: why.to_string(),
+        }));
+    }
+    writer.finish()?;
+    let folder = args.out.display();
+    if args.format == Format::Json {
+        let recorded = Recorded {
+            folder: folder.to_string(),
+            textures: textures.len(),
+            slides: written,
+            lost: all_lost,
+        };
+        return print_json(&recorded, out);
+    }
+    // of textures that were recorded before
+    out.write_all(&probe.take_words())?;
+    writeln!(
+        out,
+        "{folder}: {} of {}. Next: tactus features --recordings {folder}",
+        count(written as u64, "slide"),
+        count(textures.len() as u64, "texture")
+    )?;
+    Ok(())
+}

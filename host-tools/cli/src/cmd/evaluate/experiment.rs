@@ -1,0 +1,190 @@
+//! The arguments of `tactus evaluate`, and the experiment that they describe.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, ensure};
+use clap::ValueEnum;
+use tactus_core::explorer::SlideTime;
+use tactus_lab::data::properties::PropertyTable;
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::eval::experiment::{Experiment, Protocol};
+use tactus_lab::eval::learn::Expected;
+use tactus_lab::eval::seconds;
+use tactus_study::fabricslide::FabricSet;
+
+use crate::cmd::args::{Choosing, Ending, Expecting, Features, Recordings, Stop};
+use crate::cmd::output::Format;
+use crate::cmd::plot::Plot;
+use crate::cmd::textures::measure_folder;
+
+/// Play thousands of virtual explorations and count the right answers
+#[derive(clap::Args, Clone)]
+#[command(after_help = "\
+Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the method
+choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more probable
+than --threshold, or after --max-slides.
+
+First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none of those
+I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
+exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the known
+ones and slides are drawn with replacement, as in the paper.
+
+With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
+validate, and an action is any (movement, property) pair.
+
+With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and tested on
+the other.
+
+--novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
+is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is an
+episode of its own.
+--verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
+does, and counts the errors: at the limits, and where both are equal.
+These need the method fused.
+--early looks at each slide at a few lengths, by a table that was learned from slides of those lengths, and says how much
+shorter explorations are when a slide ends as soon as the verdict is certain, and how much more often they are wrong.
+
+--plot draws what is told of each texture (confusion), how often it was right when it said 99 %
+(reliability), and slides and errors by threshold (slides-by-threshold, errors-by-threshold). With
+--novelty it draws what is told of known and of new textures (known-by-slides, new-by-slides), with
+--verify one error against the other (trade-off), with --lifelong how far slides move away from
+what was learned (drift, drift-by-texture) and what is told of them (told-...), slide by slide.
+
+Examples:
+  tactus evaluate --recordings DIR --protocol drift
+  tactus evaluate --recordings DIR --method paper
+  tactus evaluate --recordings DIR --novelty leave-one-out
+  tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
+  tactus evaluate --recordings DIR --plot pictures
+  tactus evaluate --fabrics DIR --objective bits-per-second      slow slides have to tell more
+  tactus evaluate --recordings DIR --verify --protocol blocked
+  tactus evaluate --recordings DIR --early --protocol blocked
+  tactus evaluate --recordings DIR --lifelong
+  tactus evaluate --recordings DIR --lifelong --plot drift.svg")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    pub(crate) from: Recordings,
+    /// CSV file of properties in place of recordings
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "fabrics"])]
+    pub(crate) properties: Option<PathBuf>,
+    /// Folder of FabricSlide in place of recordings
+    #[arg(long, value_name = "DIR", conflicts_with = "recordings")]
+    pub(crate) fabrics: Option<PathBuf>,
+    /// The repetition of the fabrics to learn from, 1 or 2; the other one is tested
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub(crate) repetition: u8,
+    /// Folder to take the test slides from; training slides still come from --recordings
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["properties", "fabrics"])]
+    pub(crate) test: Option<PathBuf>,
+    /// How to decide and to choose the next movement
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    pub(crate) method: Method,
+    /// What the method fused looks at; the best that every slide has, unless given
+    #[arg(long, value_enum)]
+    pub(crate) features: Option<Features>,
+    /// Count how textures that were not learned are noticed
+    #[arg(long, value_enum, conflicts_with = "lifelong")]
+    pub(crate) novelty: Option<Novelty>,
+    /// With --novelty: textures that are left out of a table together
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "novelty", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) left_out: u16,
+    /// Play a session in time order, in which the probe goes on learning
+    #[arg(long)]
+    pub(crate) lifelong: bool,
+    /// Count how often slides are rightly called the same as a reference, and how often wrongly
+    #[arg(long, conflicts_with_all = ["lifelong", "novelty"])]
+    pub(crate) verify: bool,
+    /// End a slide as soon as the verdict is certain, and count what that saves and what it costs
+    #[arg(long, conflicts_with_all = ["lifelong", "novelty", "verify", "properties", "fabrics", "test"])]
+    pub(crate) early: bool,
+    #[command(flatten)]
+    pub(crate) ending: Ending,
+    /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
+    #[arg(long, value_name = "N")]
+    pub(crate) train_slides: Option<usize>,
+    /// Which slides to learn from and which to test on; --properties says so itself, in its column set
+    #[arg(long, value_enum, default_value_t = Protocol::Interleaved)]
+    pub(crate) protocol: Protocol,
+    /// Number of virtual explorations, 8000 unless given; with --lifelong of sessions, 50 unless given
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) runs: Option<u64>,
+    #[command(flatten)]
+    pub(crate) expecting: Expecting,
+    #[command(flatten)]
+    pub(crate) stop: Stop,
+    #[command(flatten)]
+    pub(crate) choosing: Choosing,
+    /// The same seed gives the same figures, whatever the number of cores
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How to print the figures
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub(crate) format: Format,
+    #[command(flatten)]
+    pub(crate) plot: Plot,
+}
+
+impl Args {
+    /// How long slides take.
+    pub(crate) fn slide_time(&self) -> SlideTime {
+        match self.fabrics {
+            Some(_) => seconds::FABRICS,
+            None => seconds::RIG,
+        }
+    }
+
+    /// Number of virtual explorations, or of sessions.
+    pub(crate) fn runs(&self) -> u64 {
+        self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })
+    }
+}
+
+/// How novelty is tried.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Novelty {
+    /// One texture after the other is left out of the table, or one group after the other with --left-out
+    LeaveOneOut,
+}
+
+/// What is to be evaluated, and its name.
+pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
+    let (experiment, name) = if let Some(folder) = &args.fabrics {
+        let set = FabricSet::open(folder)?;
+        let experiment = set.experiment(args.repetition - 1, args.seed)?;
+        (experiment, "fabrics")
+    } else if let Some(file) = &args.properties {
+        let set = PropertyTable::read(file)?;
+        let experiment = Experiment::given(&set, args.train_slides, args.seed)
+            .with_context(|| file.display().to_string())?;
+        (experiment, "properties")
+    } else {
+        let (set, measured) = measure_folder(&args.from.folder()?)?;
+        let test = args.test.as_deref().map(measure_folder).transpose()?;
+        if let Some((test, _)) = &test {
+            let [here, there] = [set.finger()?.0, test.finger()?.0];
+            ensure!(
+                here == there,
+                "--test has slides of the finger {there}, and the others are of {here}: they cannot be compared"
+            );
+        }
+        let test = test.map(|(set, measured)| (set.names(), measured));
+        let test = test
+            .as_ref()
+            .map(|(names, measured)| (names.as_slice(), measured.as_slice()));
+        let (names, slides) = (set.names(), args.train_slides.unwrap_or(5));
+        let experiment =
+            Experiment::recorded(names, &measured, test, args.protocol, slides, args.seed)?;
+        (experiment, args.protocol.name())
+    };
+    let features = args.features.map(Features::set);
+    let experiment = experiment.expecting(expected(args));
+    Ok((experiment.with_features(features), name))
+}
+
+/// What fused tables are to expect.
+pub(super) fn expected(args: &Args) -> Expected {
+    Expected {
+        drift: Some(args.expecting.drift),
+        ..Expected::default()
+    }
+}

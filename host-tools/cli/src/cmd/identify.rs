@@ -1,0 +1,491 @@
+//! `tactus identify`: an exploration shown step by step, on recordings and on the simulated rig.
+
+use std::fmt::Display;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::{Context as _, ensure};
+use clap::Parser;
+use rand::{Rng as _, RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use tactus_core::dsp::Plan;
+use tactus_core::explorer::{self, Config, Explorer, most_doubt};
+use tactus_core::features::Observation;
+use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
+use tactus_core::rig::Rig;
+use tactus_core::table::Table;
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::replay::{Replay, ReplayError};
+use tactus_lab::eval::evaluate::{MAX_TEXTURES, Method};
+use tactus_lab::eval::experiment::{Experiment, Protocol};
+use tactus_lab::eval::first::at_least_two;
+use tactus_lab::eval::learn::Expected;
+use tactus_lab::eval::seconds;
+use tactus_lab::eval::show::{Show, count, is_right};
+use tactus_lab::eval::transcript::{Answer, Transcript};
+use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
+use tactus_lab::sim::rig::SimRig;
+use tactus_study::pictures::exploration::Exploration;
+use tactus_study::pictures::timeline::{Timeline, Watch};
+
+use super::args::{Choosing, Expecting, Recordings, Stop, length, rising};
+use super::learn::learned_here;
+use super::output::{Done, Format, UsageError, print_json};
+use super::plot::{Canvas, Plot};
+use super::progress::with_progress;
+use super::table_file::read_table;
+use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
+
+pub(crate) const FIRST_STEPS: &str = "\
+Try first:
+  tactus                                           a simulated probe recognises an unknown texture
+  tactus identify --simulated --texture burlap     another one
+With a folder of recordings, such as `tactus unpack` writes (there with --train-slides 2):
+  tactus identify --recordings DIR --material 91   a recorded texture is recognised from its slides
+  tactus features --recordings DIR                 what every slide measures
+  tactus evaluate --recordings DIR                 how often the answers are right, and how sure
+With a probe, or with the emulated board that `cargo xtask emulate` builds:
+  tactus device list                               which port it is at
+  tactus device monitor [--emulated]               what it measures, live
+
+Recordings of a real BioTac are at https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads
+them. `tactus simulate` makes others.";
+
+/// Recognise an unknown texture from its slides, and show every step
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus identify --simulated --texture burlap
+  tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
+  tactus identify --recordings DIR --material 'bath towel'
+  tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
+  tactus identify --simulated --early                         a slide ends when that is certain
+  tactus identify --simulated --plot burlap.svg               with pictures
+
+--plot draws how probable each texture was (posterior), the unknown beside its two best candidates (spectrum), and the last
+slide over time (timeline).")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    from: Recordings,
+    /// The recorded texture to present as unknown: its number or its name
+    #[arg(long, value_name = "M", required_unless_present = "simulated")]
+    material: Option<String>,
+    /// Explore live on the simulated rig, in place of recordings
+    #[arg(long, conflicts_with_all = ["recordings", "material", "table"])]
+    simulated: bool,
+    /// The texture to put under the simulated finger: its name in Table 1 or its number; drawn by the seed unless given
+    #[arg(long, value_name = "NAME", requires = "simulated")]
+    texture: Option<String>,
+    /// How many textures the simulated probe knows; the unknown one is among them
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
+    among: u8,
+    /// End a slide of the simulated rig as soon as the verdict is certain
+    #[arg(long, requires = "simulated")]
+    early: bool,
+    /// With --early: the lengths at which a slide may end, s at constant speed
+    #[arg(long, value_name = "S,S,...", value_delimiter = ',', default_value = "0.5,1,2", requires = "early", value_parser = length)]
+    lengths: Vec<u16>,
+    /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Slides per texture to learn from, where no table is given
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    train_slides: usize,
+    /// How to decide, and how the next movement is chosen: fused, or what the table is for
+    #[arg(long, value_enum)]
+    method: Option<Method>,
+    #[command(flatten)]
+    expecting: Expecting,
+    #[command(flatten)]
+    stop: Stop,
+    #[command(flatten)]
+    choosing: Choosing,
+    /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How to print the exploration
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    #[command(flatten)]
+    plot: Plot,
+}
+
+/// What `identify --format json` prints.
+#[derive(Serialize)]
+struct Identification {
+    /// What was presented.
+    presented: String,
+    /// Whether the table holds it.
+    known: bool,
+    /// Whether the answer is right; `null` where it is undecided.
+    right: Option<bool>,
+    /// Textures of the table.
+    textures: u16,
+    method: Method,
+    threshold: f32,
+    max_slides: u8,
+    seed: u64,
+    slides: Transcript,
+    /// Whether it ended for want of recordings.
+    recordings_ran_out: bool,
+    verdict: Answer,
+    /// Time of the simulated rig, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rig_s: Option<f64>,
+    /// Work of sliding that wore the simulated skin, J.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skin_j: Option<f32>,
+    /// Seconds of sliding at constant speed, with slides that do not count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sliding_s: Option<f64>,
+}
+
+/// Explores on recordings or on the simulated rig.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+    let canvas = args.plot.open()?;
+    if args.simulated {
+        return identify_simulated(args, canvas, out);
+    }
+    let folder = args.from.folder()?;
+    let material = args.material.as_deref();
+    let material = material.context("--material")?;
+    identify_recorded(args, &folder, material, canvas, out)
+}
+
+fn identify_recorded(
+    args: &Args,
+    folder: &Path,
+    material: &str,
+    canvas: Option<Canvas>,
+    out: &mut impl Write,
+) -> anyhow::Result<Done> {
+    let set = RecordingSet::open(folder)?;
+    let index = find_material(&set, material)?;
+    let name = &set.textures()[index].name;
+    let mut random = ChaCha8Rng::seed_from_u64(args.seed);
+    let mut given = Vec::new();
+    let learned;
+    let given = match &args.table {
+        Some(file) => Some((file, read_table(file, &mut given)?)),
+        None => None,
+    };
+    let (_, measured) = measure_folder(folder)?;
+    let mut shown = set.load_texture(index)?;
+    let table = if let Some((file, table)) = given {
+        of_one_finger(&set, table)?;
+        let mut first = learned_here(&set, &measured, table);
+        shown.retain(|slide| !first.is_one(name, slide.movement));
+        ensure!(
+            !shown.is_empty(),
+            "{}: learned from every slide of {name} here; none is left to present",
+            file.display()
+        );
+        table
+    } else {
+        let (slides, interleaved) = (args.train_slides, Protocol::Interleaved);
+        let experiment =
+            Experiment::recorded(set.names(), &measured, None, interleaved, slides, args.seed)?;
+        let experiment = experiment.expecting(Expected {
+            drift: Some(args.expecting.drift),
+            ..Expected::default()
+        });
+        let run = experiment.run_alone(index as u64);
+        learned = run.learn(args.method.unwrap_or(Method::Fused).method())?;
+        let seen = &run.training()[index];
+        let mut measured = measured[index].iter();
+        shown.retain(|slide| {
+            measured.next().is_some_and(|measured| {
+                let observed_now = Observation::from(&measured.measurement);
+                slide.number == measured.number
+                    && !seen.iter().flatten().any(|l| *l == observed_now)
+            })
+        });
+        Table::read(&learned)?
+    };
+    let is_text = args.format == Format::Text;
+    if is_text && table.find(name).is_none() {
+        writeln!(
+            out,
+            "The table does not hold {name}, so the right answer is that it is none of the known textures."
+        )?;
+    }
+    let slides = count(shown.len() as u64, "slide");
+    let mut rig = Replay::new(shown, ChaCha8Rng::from_rng(&mut random));
+    if is_text {
+        writeln!(
+            out,
+            "An unknown texture, one of {}. Presented: {name}, {slides} not learned from (seed {}).",
+            table.textures(),
+            args.seed
+        )?;
+    }
+    let ran_out = |why: &ReplayError| matches!(why, ReplayError::RanOut(_));
+    let mut pictures = Pictures::new(table);
+    let found = explore_and_show(
+        &mut rig,
+        &mut pictures,
+        args,
+        &mut random,
+        name,
+        ran_out,
+        out,
+    )?;
+    if !is_text {
+        print_json(&found, out)?;
+    }
+    if let Some(canvas) = canvas {
+        let last = rig.last().map(Timeline::of_recording);
+        pictures.draw(canvas, args, last.as_ref(), out)?;
+    }
+    Ok(found.done())
+}
+
+impl Identification {
+    fn done(&self) -> Done {
+        match self.verdict.told {
+            "sure" => Done::Fully,
+            _ => Done::NotIdentified,
+        }
+    }
+}
+
+/// What is to be drawn of an exploration.
+struct Pictures<'t> {
+    exploration: Exploration<'t>,
+    /// The slide in progress, where the rig reports it.
+    watch: Arc<Mutex<Watch>>,
+}
+
+impl<'t> Pictures<'t> {
+    fn new(table: Table<'t>) -> Self {
+        Self {
+            exploration: Exploration::new(table),
+            watch: Arc::default(),
+        }
+    }
+
+    fn step<E: Display>(&mut self, step: &ExplorationStep<'_, E>, table: Table<'_>) {
+        self.exploration.step(step);
+        let mut watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        match step {
+            ExplorationStep::Chosen(action, _) => {
+                if let Some(movement) = table.movement(action.movement) {
+                    watch.begin(movement);
+                }
+            }
+            ExplorationStep::Measured(..) => watch.counted(),
+            _ => {}
+        }
+    }
+
+    fn draw(
+        &self,
+        canvas: Canvas,
+        args: &Args,
+        last: Option<&Timeline>,
+        out: &mut impl Write,
+    ) -> anyhow::Result<()> {
+        let mut figures = self.exploration.figures(args.stop.threshold)?;
+        figures.extend(last.map(Timeline::figure).transpose()?);
+        canvas.write("tactus identify", &figures, out)
+    }
+}
+
+/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text, shows
+/// every step.
+fn explore_and_show<R>(
+    rig: &mut R,
+    pictures: &mut Pictures<'_>,
+    args: &Args,
+    random: &mut ChaCha8Rng,
+    truth: &str,
+    ran_out: impl Fn(&R::Error) -> bool,
+    out: &mut impl Write,
+) -> anyhow::Result<Identification>
+where
+    R: Rig<Error: std::error::Error + Send + Sync + 'static>,
+{
+    let table = pictures.exploration.table();
+    let best = Method::of(explorer::Method::of(table.contents()));
+    let method = args.method.unwrap_or(best);
+    let config = Config {
+        open: true,
+        ..args.stop.config(method)
+    };
+    let config = args.choosing.config(config, seconds::RIG)?;
+    let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
+    out.flush()?;
+    let mut slides = Transcript::default();
+    let is_text = args.format == Format::Text;
+    let mut show = Show::new(table, out);
+    let verdict = embassy_futures::block_on(explore(
+        rig,
+        &mut explorer,
+        &Plan::new(),
+        || random.next_u32(),
+        |event| {
+            slides.step(&event, table);
+            pictures.step(&event, table);
+            if let ExplorationStep::Chosen(action, expected) = &event {
+                let movement = table.movement(action.movement).map(|m| m.to_string());
+                let property = action.property.map(|p| p.to_string());
+                tracing::info!(movement, property, of = expected.len(), "chooses");
+            }
+            match event {
+                // shown below: recordings that run out are no failure
+                ExplorationStep::CutShort(..) => {}
+                event if is_text => show.step(event),
+                _ => {}
+            }
+        },
+    ));
+    let mut recordings_ran_out = false;
+    let verdict = match verdict {
+        Err(ExploreError::Rejected(Rejection::Rig(why)))
+            if ran_out(&why) && explorer.slides() > 0 =>
+        {
+            if is_text {
+                show.line("\nThe recordings have run out, and none counts twice.")?;
+            }
+            recordings_ran_out = true;
+            explorer.best()
+        }
+        Err(why) => {
+            if is_text && explorer.slides() > 0 {
+                let known = (&explorer.best(), explorer.slides());
+                show.step::<R::Error>(ExplorationStep::CutShort(known.0, known.1));
+            }
+            return Err(why.into());
+        }
+        Ok(verdict) => verdict,
+    };
+    if is_text {
+        show.finish(verdict, explorer.slides(), truth)?;
+    }
+    Ok(Identification {
+        presented: truth.to_owned(),
+        known: table.find(truth).is_some(),
+        right: is_right(verdict, truth, table),
+        textures: table.textures(),
+        method,
+        threshold: args.stop.threshold,
+        max_slides: args.stop.max_slides,
+        seed: args.seed,
+        slides,
+        recordings_ran_out,
+        verdict: Answer::new(verdict, explorer.slides(), table),
+        rig_s: None,
+        skin_j: None,
+        sliding_s: None,
+    })
+}
+
+/// The arguments of the demonstration: those of the command.
+#[derive(Parser)]
+struct Demonstration {
+    #[command(flatten)]
+    args: Args,
+}
+
+/// What a newcomer sees first.
+pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
+    writeln!(
+        out,
+        "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, over a\n\
+         stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then given\n\
+         one of them without being told which. The firmware's own core measures, decides and controls the rig.\n"
+    )?;
+    out.flush()?;
+    let Demonstration { args } = Demonstration::parse_from(["identify", "--simulated"]);
+    identify_simulated(&args, None, out)?;
+    writeln!(out, "\n{FIRST_STEPS}\n\nAll commands: tactus --help")?;
+    Ok(())
+}
+
+fn identify_simulated(
+    args: &Args,
+    canvas: Option<Canvas>,
+    out: &mut impl Write,
+) -> anyhow::Result<Done> {
+    let mut random = ChaCha8Rng::seed_from_u64(args.seed);
+    let unknown = match &args.texture {
+        Some(name) => find_textures(std::slice::from_ref(name))?[0],
+        None => random.random_range(1..=117),
+    };
+    at_least_two(args.train_slides)?;
+    let collection = Collection {
+        seed: args.seed,
+        textures: Collection::spread(unknown, args.among),
+        trials: u32::try_from(args.train_slides).context("--train-slides")?,
+    };
+    let calibration = calibrated(collection.setup(unknown, 0))?;
+    let method = args.method.unwrap_or(Method::Fused).method();
+    let textures = collection.textures.len() as u64;
+    let lengths_ms = rising(&args.lengths)?;
+    if args.early && most_doubt(method).is_none() {
+        let say = "--early is for the method fused: any other is wrong more often when it is asked more often";
+        return Err(UsageError(say.to_owned()).into());
+    }
+    let bytes = with_progress(textures, "learning textures", |done| {
+        if args.early {
+            collection.learn_lengths(method, calibration, &lengths_ms, done)
+        } else {
+            collection.learn(method, calibration, done)
+        }
+    })?;
+    let table = Table::read(&bytes)?;
+    let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
+    rig.control().calibrate(calibration)?;
+    let name = texture_name(unknown);
+    let is_text = args.format == Format::Text;
+    if is_text {
+        writeln!(
+            out,
+            "An unknown texture, one of {}. Under the finger: {name} (seed {}).",
+            table.textures(),
+            args.seed
+        )?;
+    }
+    let never = |_: &_| false;
+    let mut pictures = Pictures::new(table);
+    if canvas.is_some() {
+        let watch = Arc::clone(&pictures.watch);
+        rig.listen(Box::new(move |at_ms, event| {
+            let mut watch = watch.lock().unwrap_or_else(PoisonError::into_inner);
+            watch.report(at_ms, &event);
+        }));
+    }
+    let found = explore_and_show(&mut rig, &mut pictures, args, &mut random, name, never, out)?;
+    let seconds = rig.now().as_secs_f64();
+    let sliding_s: f64 = rig.performed().iter().map(|made| made.steady_s).sum();
+    let skin = rig.control().skin();
+    let found = Identification {
+        rig_s: Some(seconds),
+        skin_j: Some(skin.energy_j()),
+        sliding_s: args.early.then_some(sliding_s),
+        ..found
+    };
+    if is_text {
+        writeln!(
+            out,
+            "{seconds:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
+            skin.energy_j(),
+            if skin.is_worn() { ", look at it" } else { "" }
+        )?;
+        if args.early {
+            writeln!(out, "{sliding_s:.1} s of sliding at constant speed.")?;
+        }
+    } else {
+        print_json(&found, out)?;
+    }
+    if let Some(canvas) = canvas {
+        let watch = pictures
+            .watch
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        pictures.draw(canvas, args, watch.last(), out)?;
+    }
+    Ok(found.done())
+}

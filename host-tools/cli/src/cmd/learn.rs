@@ -1,0 +1,289 @@
+//! `tactus learn` and `tactus learn-by-hand`: tables of textures from slides.
+
+use std::collections::HashMap;
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail, ensure};
+use serde::Serialize;
+use tactus_core::explorer;
+use tactus_core::features::Movement;
+use tactus_core::sensor::FingerName;
+use tactus_core::table::{FALSE_ALARM, Table};
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::replay::{MeasuredSlide, measure_cut};
+use tactus_lab::eval::early::{is_longer, of_length};
+use tactus_lab::eval::evaluate::Method;
+use tactus_lab::eval::first::learn_first;
+use tactus_lab::eval::learn::{Expected, know_lengths};
+use tactus_lab::eval::show::count;
+use tactus_lab::sim::collection::texture_name;
+
+use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
+use super::output::{Format, print_json};
+use super::progress::with_progress;
+use super::table_file::{TableFile, beside, write_table};
+use super::textures::{collection, measure_folder};
+
+/// Learn a texture table from the first slides of every texture
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus learn --recordings DIR --out table
+  tactus learn --recordings DIR --method paper --out table     the table of the paper's method
+  tactus learn --recordings DIR --lengths 1,2,3 --out table    and what slides say after 1, 2 and 3 s
+  tactus device table push table                               gives it to the probe
+  tactus learn --recordings DIR --out - | tactus device table push - --yes")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    from: Recordings,
+    /// Slides to learn from, per texture and movement: the first ones of the session, or as many as there are, two at least
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    train_slides: usize,
+    /// The way of deciding that the table is for: fused, or the others, which share one kind of table
+    #[arg(long, value_enum, default_value_t = Method::Fused)]
+    method: Method,
+    /// What a fused table is learned from; the best that every slide has, unless given
+    #[arg(long, value_enum)]
+    features: Option<Features>,
+    #[command(flatten)]
+    expecting: Expecting,
+    /// Share of the known textures that may be taken for new ones, unless `identify` says otherwise
+    #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
+    false_alarm: f32,
+    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end early
+    /// then. The image tactus-rig takes such a table, the others refuse it
+    #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
+    lengths: Vec<u16>,
+    /// The file to write; "-": standard output
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// How to print what was learned
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `learn` and `learn-by-hand` print as JSON.
+#[derive(Serialize)]
+struct Learned {
+    #[serde(flatten)]
+    table: TableFile,
+    /// Slides of each texture and movement that were to be learned from.
+    train_slides: usize,
+    /// Textures that have fewer of a movement.
+    short: Vec<Short>,
+    /// Textures without a good slide.
+    left_out: Vec<String>,
+}
+
+/// A texture with fewer slides of a movement than were asked for.
+#[derive(Serialize)]
+struct Short {
+    texture: String,
+    force_n: f32,
+    speed_mm_s: f32,
+    slides: usize,
+    #[serde(skip)]
+    movement: Movement,
+}
+
+/// Learn a handheld probe's table from slides of a simulated hand
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus learn-by-hand --out table
+  tactus learn-by-hand --textures burlap,47,'silk satin' --out table")]
+pub(crate) struct ByHand {
+    /// The file to write; "-": standard output
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Textures of Table 1, by number or name; all 117 unless given
+    #[arg(long, value_name = "T,T,...", value_delimiter = ',')]
+    textures: Vec<String>,
+    /// Slides per texture
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(2..=255))]
+    trials: u32,
+    /// Another seed is another world, and another hand
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The finger that slides: biotac, analog or mems
+    #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
+    finger: FingerName,
+    /// How to print what was learned
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// Learns a table from recordings.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let folder = args.from.folder()?;
+    let (set, measured) = measure_folder(&folder)?;
+    let features = args.features.map(Features::set);
+    let expected = Expected {
+        drift: Some(args.expecting.drift),
+        false_alarm: args.false_alarm,
+    };
+    let bytes = learn_first(
+        &set,
+        &measured,
+        args.train_slides,
+        args.method,
+        features,
+        &expected,
+    )
+    .with_context(|| folder.display().to_string())?;
+    let bytes = with_lengths(args, &set, bytes, &expected)?;
+    write_table(&args.out, &bytes)?;
+    let out = &mut beside(&args.out, out);
+    let mut short = Vec::new();
+    for (texture, measured) in set.textures().iter().zip(&measured) {
+        for movement in set.movements() {
+            let slides = measured.iter().filter(|s| s.movement == movement).count();
+            if slides < args.train_slides {
+                short.push(Short {
+                    texture: texture.name.clone(),
+                    force_n: movement.force_n(),
+                    speed_mm_s: movement.speed_mm_s(),
+                    slides,
+                    movement,
+                });
+            }
+        }
+    }
+    let learned = Learned {
+        table: TableFile::new(&args.out, Table::read(&bytes)?),
+        train_slides: args.train_slides,
+        short,
+        left_out: Vec::new(),
+    };
+    if args.format == Format::Json {
+        return print_json(&learned, out);
+    }
+    writeln!(
+        out,
+        "{}: {} learned from the first {} of each, {} bytes",
+        args.out.display(),
+        count(set.textures().len() as u64, "texture"),
+        count(args.train_slides as u64, "slide"),
+        bytes.len()
+    )?;
+    for short in &learned.short {
+        let slides = count(short.slides as u64, "slide");
+        writeln!(out, "{}, {}: only {slides}", short.texture, short.movement)?;
+    }
+    Ok(())
+}
+
+/// The table with what the first parts of its slides say, if that was asked for.
+fn with_lengths(
+    args: &Args,
+    set: &RecordingSet,
+    bytes: Vec<u8>,
+    expected: &Expected,
+) -> anyhow::Result<Vec<u8>> {
+    if args.lengths.is_empty() {
+        return Ok(bytes);
+    }
+    let lengths_ms = rising(&args.lengths)?;
+    ensure!(
+        !Table::read(&bytes)?.is_paced(),
+        "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not both"
+    );
+    let textures = set.textures().len() as u64;
+    let slides = with_progress(textures, "measuring first parts", |done| {
+        measure_cut(set, &lengths_ms, |_| done())
+    })?;
+    let features = args.features.map(Features::set);
+    let shorter = (0..).zip(&lengths_ms).map(|(n, &ms)| {
+        let of_length = of_length(&slides, n);
+        let movements = (0..).zip(set.movements());
+        let longer = movements.filter(|(_, movement)| is_longer(&slides, *movement, n));
+        let movements = longer.map(|(at, _)| 1_u64 << at).sum();
+        let (slides, method) = (args.train_slides, args.method);
+        let table = learn_first(set, &of_length, slides, method, features, expected)?;
+        Ok((ms, table, movements))
+    });
+    let shorter = shorter.collect::<anyhow::Result<Vec<_>>>()?;
+    if let Some((ms, ..)) = shorter.iter().find(|(.., movements)| *movements == 0) {
+        bail!(
+            "--lengths: no movement's slides are all longer than {} s",
+            f64::from(*ms) / 1e3
+        );
+    }
+    Ok(know_lengths(&bytes, &shorter)?)
+}
+
+/// Learns a handheld probe's table.
+pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()> {
+    let collection = collection(&args.textures, args.trials, args.seed)?;
+    let textures = collection.textures.len() as u64;
+    let (bytes, left_out) = with_progress(textures, "sliding by hand", |done| {
+        tactus_lab::sim::handheld::learn_with(args.finger, &collection, done)
+    })?;
+    write_table(&args.out, &bytes)?;
+    let out = &mut beside(&args.out, out);
+    let left_out = left_out.into_iter().map(|n| texture_name(n).to_owned());
+    let learned = Learned {
+        table: TableFile::new(&args.out, Table::read(&bytes)?),
+        train_slides: args.trials as usize,
+        short: Vec::new(),
+        left_out: left_out.collect(),
+    };
+    if args.format == Format::Json {
+        return print_json(&learned, out);
+    }
+    writeln!(
+        out,
+        "{}: {} learned from {} of each by hand, {} bytes",
+        args.out.display(),
+        count(
+            (collection.textures.len() - learned.left_out.len()) as u64,
+            "texture"
+        ),
+        count(args.trials, "slide"),
+        bytes.len()
+    )?;
+    for name in &learned.left_out {
+        writeln!(out, "left out, no good slide of it: {name}")?;
+    }
+    Ok(())
+}
+
+/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this folder.
+pub(crate) struct LearnedHere {
+    first: usize,
+    met: HashMap<(String, Movement), usize>,
+}
+
+impl LearnedHere {
+    /// Whether the next slide of this texture and movement, in the order of time, is one of them.
+    pub(crate) fn is_one(&mut self, texture: &str, movement: Movement) -> bool {
+        let before = self.met.entry((texture.to_owned(), movement)).or_default();
+        *before += 1;
+        *before <= self.first
+    }
+}
+
+/// Which slides of this folder the table was learned from.
+pub(crate) fn learned_here(
+    set: &RecordingSet,
+    measured: &[Vec<MeasuredSlide>],
+    table: Table<'_>,
+) -> LearnedHere {
+    let cells = (0..table.textures())
+        .flat_map(|texture| (0..).zip(table.movements()).map(move |(m, _)| (texture, m)));
+    let trials = cells.map(|(texture, movement)| table.trials(texture, movement));
+    let trials = trials.max().unwrap_or(0).into();
+    let learned_as = Method::of(explorer::Method::of(table.contents()));
+    let expected = Expected {
+        drift: table.drift(),
+        false_alarm: table.limits().map_or(FALSE_ALARM, |l| l.false_alarm),
+    };
+    let own = learn_first(set, measured, trials, learned_as, None, &expected);
+    let whole = know_lengths(table.as_bytes(), &[]);
+    let is_own = own.is_ok_and(|own| whole.is_ok_and(|whole| own == whole));
+    LearnedHere {
+        first: if is_own { trials } else { 0 },
+        met: HashMap::new(),
+    }
+}

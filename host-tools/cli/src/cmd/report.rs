@@ -1,0 +1,178 @@
+//! `tactus report`: what a table is good for, on one page.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use serde::Serialize;
+use tactus_core::table::Table;
+use tactus_lab::data::whole::write_whole;
+use tactus_lab::eval::report::{RUNS, Report, Slides};
+use tactus_lab::eval::samples;
+use tactus_lab::eval::show::count;
+use tactus_study::page::render;
+use tactus_study::pictures::map;
+
+use super::learn::learned_here;
+use super::output::{Format, percent, print_json, verdict_rows};
+use super::progress::{notice, progress};
+use super::table_file::read_table;
+use super::textures::{measure_folder, of_one_finger};
+
+/// Say what a table is good for: which textures are told apart, how soon, and what would help
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus report TABLE                                        textures, nearest pairs, advice
+  tactus report TABLE --recordings DIR --out report.html     and what users would be told, as a page
+
+Slides that the table was learned from do not count, where it was learned from this very folder.")]
+pub(crate) struct Args {
+    /// The table
+    table: PathBuf,
+    /// Recordings to explore with it; they may hold textures that it does not have
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+    /// Seed of the explorations
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The page to write; a page that is there is replaced
+    #[arg(long, value_name = "FILE.html")]
+    out: Option<PathBuf>,
+    /// How to print the report
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What the page is made of.
+#[derive(Serialize)]
+struct Page<'r> {
+    name: String,
+    version: &'static str,
+    command: String,
+    report: &'r Report,
+    map: String,
+}
+
+/// Reports on a table.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let mut bytes = Vec::new();
+    let table = read_table(&args.table, &mut bytes)?;
+    let slides = match &args.recordings {
+        Some(folder) => Some(unseen(folder, table)?),
+        None => None,
+    };
+    let runs = slides
+        .as_ref()
+        .map_or(0, |slides| RUNS * slides.len() as u64);
+    let bar = progress(runs, "exploring");
+    let report = Report::new(table, slides.as_deref(), args.seed, || bar.inc(1));
+    bar.finish_and_clear();
+    let report = report.with_context(|| args.table.display().to_string())?;
+    if let Some(path) = &args.out {
+        let page = Page {
+            name: args.table.display().to_string(),
+            version: env!("CARGO_PKG_VERSION"),
+            command: command(args),
+            report: &report,
+            map: map::figure(table)?.svg,
+        };
+        let page = render(include_str!("report/page.html"), &page)?;
+        write_whole(path, page).with_context(|| path.display().to_string())?;
+    }
+    match args.format {
+        Format::Json => print_json(&report, out)?,
+        Format::Text => print(&report, &samples::in_words(table), out)?,
+    }
+    out.flush()?;
+    if let Some(path) = &args.out {
+        notice(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+fn command(args: &Args) -> String {
+    let mut command = format!("tactus report {}", args.table.display());
+    if let Some(folder) = &args.recordings {
+        command += &format!(" --recordings {} --seed {}", folder.display(), args.seed);
+    }
+    command
+}
+
+/// The slides of a folder that the table has not seen.
+fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<Vec<Slides>> {
+    let (set, measured) = measure_folder(folder)?;
+    of_one_finger(&set, table)?;
+    let mut first = learned_here(&set, &measured, table);
+    let textures = set.textures().iter().zip(measured);
+    Ok(textures
+        .map(|(texture, mut slides)| {
+            slides.retain(|slide| !first.is_one(&texture.name, slide.movement));
+            Slides {
+                name: texture.name.clone(),
+                slides,
+            }
+        })
+        .collect())
+}
+
+fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result<()> {
+    let wide = report.textures.iter().map(|t| t.name.chars().count()).max();
+    let wide = wide.unwrap_or(0).max(7);
+    writeln!(
+        out,
+        "{}, {}\n\n{:<wide$}  {:>6}  {:<wide$} {:>12} {:>14}",
+        count(report.textures.len() as u64, "texture"),
+        count(report.table.movements.len() as u64, "movement"),
+        "texture",
+        "slides",
+        "nearest",
+        "taken for it",
+        "slides to tell"
+    )?;
+    for texture in &report.textures {
+        let learned: u32 = texture.trials.iter().map(|&n| u32::from(n)).sum();
+        let (nearest, taken, slides) = match &texture.nearest {
+            Some(near) => (
+                near.texture.as_str(),
+                percent((1000.0 * near.taken_for).round() / 1000.0),
+                near.slides.map_or("over ten".to_owned(), |n| n.to_string()),
+            ),
+            None => ("-", "-".to_owned(), "-".to_owned()),
+        };
+        let name = &texture.name;
+        writeln!(
+            out,
+            "{name:<wide$}  {learned:>6}  {nearest:<wide$} {taken:>12} {slides:>14}"
+        )?;
+    }
+    writeln!(out, "{samples}")?;
+    if let Some(recorded) = &report.recorded {
+        let explorations = count(recorded.explorations as u64, "exploration");
+        writeln!(
+            out,
+            "\nWhat users would be told, by {explorations} of recorded slides, {:.1} slides each in the mean:",
+            recorded.mean_slides
+        )?;
+        let unknown = recorded.unknown.as_ref();
+        let of = [
+            ("textures of the table", Some(&recorded.known)),
+            ("others", unknown),
+        ];
+        for (kind, verdicts) in of.into_iter().filter_map(|(k, v)| Some((k, v?))) {
+            let told = verdict_rows(verdicts).map(|(name, share, remark)| {
+                let share = percent((1000.0 * share).round() / 1000.0);
+                format!("{name} {share}{remark}")
+            });
+            writeln!(out, "  {kind}: {}", told.join(", "))?;
+        }
+    }
+    match report.advice.is_empty() {
+        true => writeln!(
+            out,
+            "\nNothing stands out: all textures are told apart by a few slides."
+        )?,
+        false => writeln!(out, "\nWhat would help:\n- {}", report.advice.join("\n- "))?,
+    }
+    Ok(())
+}

@@ -1,0 +1,108 @@
+//! `tactus unpack`: what the command brings along, as files.
+
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, ensure};
+use serde::Serialize;
+use tactus_core::sensor::FingerName;
+use tactus_core::table::factory;
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::eval::show::count;
+
+use super::output::{Format, print_json};
+use super::simulate;
+use super::table_file::write_table;
+use super::textures::collection;
+
+/// The textures of the recordings, by their numbers in Table 1, and how often each is slid over at each movement.
+const TEXTURES: [&str; 6] = ["1", "70", "91", "95", "100", "105"];
+const TRIALS: u32 = 3;
+const SEED: u64 = 1;
+/// The folder of the recordings in that which is written.
+const RECORDINGS: &str = "recordings";
+
+/// Write what the command brings along: factory tables, and small recordings of the simulated rig
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tactus unpack tactus-data
+  tactus table show tactus-data/factory.tact
+  tactus identify --recordings tactus-data/recordings --material Corduroy --train-slides 2
+  tactus evaluate --recordings tactus-data/recordings --train-slides 2
+
+The recordings have six textures at three movements, three slides each. They are made on the
+simulated rig, and are byte for byte those of the project. The same command goes on where an
+interrupted one stopped.")]
+pub(crate) struct Args {
+    /// The folder to write; a table of the same name that is another one is left alone
+    folder: PathBuf,
+    /// How to print what was written
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+/// What `unpack --format json` prints.
+#[derive(Serialize)]
+struct Unpacked {
+    /// The files, by their paths.
+    tables: Vec<String>,
+    /// The folder.
+    recordings: String,
+    slides: usize,
+}
+
+/// Writes tables and recordings.
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    fs::create_dir_all(&args.folder)
+        .with_context(|| format!("cannot make {}", args.folder.display()))?;
+    let mut tables = Vec::new();
+    for (name, table) in factory::ALL {
+        let file = args.folder.join(name);
+        write(&file, table)?;
+        tables.push(file.display().to_string());
+    }
+    let folder = args.folder.join(RECORDINGS);
+    let collection = collection(&TEXTURES.map(str::to_owned), TRIALS, SEED)?;
+    let slides = match RecordingSet::open(&folder) {
+        // written to their end before
+        Ok(there) if there.names() == collection.names() => (0..TEXTURES.len())
+            .map(|texture| there.slides(texture).len())
+            .sum(),
+        _ => simulate::record(&collection, &folder, FingerName::Biotac)?,
+    };
+    let unpacked = Unpacked {
+        tables,
+        recordings: folder.display().to_string(),
+        slides,
+    };
+    if args.format == Format::Json {
+        return print_json(&unpacked, out);
+    }
+    for table in &unpacked.tables {
+        writeln!(out, "{table}")?;
+    }
+    let (textures, slides) = (
+        count(TEXTURES.len() as u64, "texture"),
+        count(slides as u64, "slide"),
+    );
+    writeln!(out, "{}: {textures}, {slides}", unpacked.recordings)?;
+    Ok(())
+}
+
+/// Writes a table, unless it is there.
+fn write(file: &Path, table: &[u8]) -> anyhow::Result<()> {
+    match fs::read(file) {
+        Ok(there) => {
+            ensure!(
+                there == table,
+                "{} is another table than the factory's: give another folder, or move it away",
+                file.display()
+            );
+            Ok(())
+        }
+        Err(why) if why.kind() == ErrorKind::NotFound => write_table(file, table),
+        Err(why) => Err(why).with_context(|| format!("cannot read {}", file.display())),
+    }
+}

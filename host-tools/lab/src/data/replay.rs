@@ -1,0 +1,254 @@
+//! Recorded slides, measured by the core: a [`Rig`] replays them one by one, or a whole folder is measured at once.
+
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use tactus_core::dsp::{Kernels, Plain, Plan};
+use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
+use tactus_core::rig::Rig;
+
+use crate::data::recording::{Recording, Texture};
+use crate::data::recordings::{RecordingError, RecordingSet};
+
+/// The properties of one recorded slide.
+///
+/// # Errors
+/// The slide has none: it is too short or silent.
+pub fn measure(plan: &Plan, recorded: &Recording) -> Result<Measurement, SlideError> {
+    let mut slide = Slide::<Plain>::new(plan, recorded.movement);
+    recorded.play(&mut slide);
+    slide.finish()
+}
+
+/// The features of one recorded slide.
+#[derive(Clone, Debug)]
+pub struct MeasuredSlide {
+    /// Number of the slide, in the order of time.
+    pub number: u32,
+    /// The movement that made it.
+    pub movement: Movement,
+    /// What the core computed.
+    pub measurement: Measurement,
+}
+
+/// Why a folder cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// One of its slides has no properties.
+    #[error("slide {number} of {texture}: {why}")]
+    Slide {
+        /// Name of the texture.
+        texture: String,
+        /// Number of the slide.
+        number: u32,
+        /// What is wrong with it.
+        why: SlideError,
+    },
+}
+
+/// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns the
+/// slides of each texture in the order of time.
+///
+/// # Errors
+/// The first file that cannot be read, or the first slide that has no properties.
+pub fn measure_all(
+    set: &RecordingSet,
+    done: impl Fn(&Texture) + Sync,
+) -> Result<Vec<Vec<MeasuredSlide>>, MeasureError> {
+    measure_each(set, done, |plan, slide| {
+        Ok(MeasuredSlide {
+            number: slide.number,
+            movement: slide.movement,
+            measurement: measure(plan, slide)?,
+        })
+    })
+}
+
+/// A recorded slide, and what its first part alone would have said.
+#[derive(Clone, Debug)]
+pub struct CutSlide {
+    /// The whole slide.
+    pub whole: MeasuredSlide,
+    /// How long it is at constant speed, s.
+    pub seconds: f32,
+    /// Its first part, for each length that was asked for; `None` where it does not last longer.
+    pub first: Vec<Option<Measurement>>,
+}
+
+/// As [`measure_all`], and the first part of each slide, of each of these lengths, in ms at constant speed.
+///
+/// # Errors
+/// As [`measure_all`]; the first part of a slide may be too short to have properties, too.
+pub fn measure_cut(
+    set: &RecordingSet,
+    lengths_ms: &[u16],
+    done: impl Fn(&Texture) + Sync,
+) -> Result<Vec<Vec<CutSlide>>, MeasureError> {
+    measure_each(set, done, |plan, slide| {
+        let first = |&ms: &u16| {
+            slide
+                .first(ms)
+                .map(|first| measure(plan, &first))
+                .transpose()
+        };
+        Ok(CutSlide {
+            first: lengths_ms.iter().map(first).collect::<Result<_, _>>()?,
+            seconds: slide.window.1 - slide.window.0,
+            whole: MeasuredSlide {
+                number: slide.number,
+                movement: slide.movement,
+                measurement: measure(plan, slide)?,
+            },
+        })
+    })
+}
+
+fn measure_each<T: Send>(
+    set: &RecordingSet,
+    done: impl Fn(&Texture) + Sync,
+    of: impl Fn(&Plan, &Recording) -> Result<T, SlideError> + Sync,
+) -> Result<Vec<Vec<T>>, MeasureError> {
+    let plan = Plan::new();
+    (0..set.textures().len())
+        .into_par_iter()
+        .panic_fuse()
+        .map(|index| {
+            let texture = &set.textures()[index];
+            let measured = set
+                .load_texture(index)?
+                .iter()
+                .map(|slide| {
+                    of(&plan, slide).map_err(|why| MeasureError::Slide {
+                        texture: texture.name.clone(),
+                        number: slide.number,
+                        why,
+                    })
+                })
+                .collect::<Result<Vec<_>, MeasureError>>()?;
+            done(texture);
+            Ok(measured)
+        })
+        .collect()
+}
+
+/// A rig whose unknown texture is a pile of recorded slides: each movement replays one of that movement, drawn without
+/// replacement. A slide that was seen before is no fresh evidence.
+#[derive(Debug)]
+pub struct Replay {
+    /// Those that were not replayed yet.
+    slides: Vec<Recording>,
+    last: Option<Recording>,
+    /// The movements that were recorded.
+    movements: Vec<Movement>,
+    measures: PropertySet,
+    random: ChaCha8Rng,
+}
+
+/// There is no slide to replay.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// There never was.
+    #[error("no slide of the movement {0} was recorded")]
+    NotRecorded(Movement),
+    /// All of them were replayed.
+    #[error("no recorded slide at {0} is left")]
+    RanOut(Movement),
+}
+
+impl Replay {
+    /// A rig that replays `slides`.
+    pub fn new(slides: Vec<Recording>, random: ChaCha8Rng) -> Self {
+        let traction = slides.iter().all(|s| s.outside_mn.is_some());
+        let mut movements = Vec::new();
+        for slide in &slides {
+            if !movements.contains(&slide.movement) {
+                movements.push(slide.movement);
+            }
+        }
+        Self {
+            measures: Property::ALL
+                .into_iter()
+                .filter(|&p| traction || p != Property::Traction)
+                .collect(),
+            slides,
+            last: None,
+            movements,
+            random,
+        }
+    }
+
+    /// The slide that was replayed last.
+    pub fn last(&self) -> Option<&Recording> {
+        self.last.as_ref()
+    }
+}
+
+impl Rig for Replay {
+    type Error = ReplayError;
+
+    fn measures(&self) -> PropertySet {
+        self.measures
+    }
+
+    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), ReplayError> {
+        let movement = slide.movement();
+        let recorded = (0..).zip(&self.slides);
+        let recorded: Vec<usize> = recorded
+            .filter(|(_, s)| s.movement == movement)
+            .map(|(at, _)| at)
+            .collect();
+        if recorded.is_empty() {
+            return Err(if self.movements.contains(&movement) {
+                ReplayError::RanOut(movement)
+            } else {
+                ReplayError::NotRecorded(movement)
+            });
+        }
+        let drawn = recorded[self.random.random_range(0..recorded.len())];
+        self.last.insert(self.slides.remove(drawn)).play(slide);
+        Ok(())
+    }
+
+    /// Another movement may have slides left.
+    async fn recover(&mut self, _failed: &ReplayError) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use embassy_futures::block_on;
+    use rand::SeedableRng as _;
+
+    use super::*;
+
+    #[test]
+    fn no_slide_is_replayed_twice() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
+        let set = RecordingSet::open(folder.as_ref()).unwrap();
+        let slides = set.load_texture(0).unwrap();
+        let movement = slides[0].movement;
+        let there = slides.iter().filter(|s| s.movement == movement).count();
+        assert!(there > 2);
+        let plan = Plan::new();
+        let mut rig = Replay::new(slides, ChaCha8Rng::seed_from_u64(1));
+        let mut seen = Vec::new();
+        let mut slide = |movement| {
+            let mut slide = Slide::<Plain>::new(&plan, movement);
+            block_on(rig.perform(&mut slide))?;
+            Ok(slide.finish().unwrap().properties)
+        };
+        for _ in 0..there {
+            let properties = slide(movement).unwrap();
+            assert!(!seen.contains(&properties));
+            seen.push(properties);
+        }
+        assert_eq!(slide(movement), Err(ReplayError::RanOut(movement)));
+        let elsewhere = Movement::grid().find(|m| !set.movements().contains(m));
+        let elsewhere = elsewhere.unwrap();
+        assert_eq!(slide(elsewhere), Err(ReplayError::NotRecorded(elsewhere)));
+    }
+}

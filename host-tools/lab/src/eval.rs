@@ -1,0 +1,27 @@
+//! Texture tables learned from recorded slides, and how well they tell textures apart.
+
+pub mod alike;
+mod calibrate;
+pub mod courses;
+pub mod early;
+pub mod evaluate;
+pub mod evaluation;
+pub mod experiment;
+pub mod first;
+pub mod gauge;
+pub mod learn;
+pub mod lifelong;
+pub mod novelty;
+mod pace;
+pub mod places;
+pub mod refresh;
+pub mod reliability;
+pub mod report;
+pub mod samples;
+pub mod seconds;
+pub mod show;
+pub mod table_summary;
+pub mod transcript;
+pub mod verdicts;
+pub mod verified;
+pub mod verify;

@@ -1,0 +1,165 @@
+//! What is seen of a probe: its host in the simulation.
+
+use std::cell::Cell;
+use std::time::Duration;
+
+use tactus_core::probe::RigState;
+use tactus_core::rig::{Phase, RigError};
+use tactus_core::wire::Event;
+
+use super::hearing::{Heard, Hearing};
+use super::message::{Frame, Happening};
+use crate::sim::probe::Host;
+use crate::sim::rig::SimRig;
+use tactus_world::world::Truth;
+
+/// P_DC is shown so often, ms.
+const PDC_MS: u64 = 10;
+
+/// What is under way, and what was seen since the last frame.
+pub(super) struct Scene {
+    /// The time at which it stands still; `None`: it does not.
+    pub(super) until: Option<Duration>,
+    /// Whether somebody waits for it to go on.
+    pub(super) waits: Cell<bool>,
+    /// What is to be done to the rig before its next millisecond.
+    texture: Option<u8>,
+    pub(super) wear: Option<f64>,
+    pub(super) stop: bool,
+    /// What the probe says.
+    pub(super) hearing: Hearing,
+    now: Duration,
+    phase: Phase,
+    truth: Truth,
+    pdc: Vec<u16>,
+    pub(super) busy: bool,
+}
+
+impl Scene {
+    pub(super) fn new() -> Self {
+        Self {
+            until: None,
+            waits: Cell::new(false),
+            texture: None,
+            wear: None,
+            stop: false,
+            hearing: Hearing::default(),
+            now: Duration::ZERO,
+            phase: Phase::Parked,
+            truth: Truth::default(),
+            pdc: Vec::new(),
+            busy: false,
+        }
+    }
+
+    /// The time of the rig.
+    pub(super) fn now(&self) -> Duration {
+        self.now
+    }
+
+    /// Number of what lies under the finger.
+    pub(super) fn texture(&self) -> u8 {
+        self.truth.texture
+    }
+
+    /// Another texture is to be put under the finger, which was `lifted` for that.
+    pub(super) fn place(&mut self, texture: u8, lifted: Result<(), RigError>) {
+        match lifted {
+            Ok(()) => self.texture = Some(texture),
+            Err(why) => self.hearing.happens(Happening::Refused {
+                why: why.to_string(),
+            }),
+        }
+    }
+
+    /// What has been since the last frame.
+    pub(super) fn frame(&mut self) -> Frame {
+        let Truth {
+            tip_mm,
+            indentation_mm,
+            stage_mm,
+            speed_mm_s,
+            force_n,
+            shear_n,
+            texture,
+            wear,
+            ..
+        } = self.truth;
+        let Heard {
+            pac,
+            spectra,
+            happened,
+        } = self.hearing.take();
+        Frame {
+            at_ms: self.now.as_millis() as u64,
+            busy: self.busy,
+            phase: self.phase.into(),
+            tip_mm,
+            indentation_mm,
+            stage_mm,
+            speed_mm_s,
+            force_n,
+            shear_n,
+            texture,
+            wear: self.wear.unwrap_or(wear),
+            pac,
+            pdc: std::mem::take(&mut self.pdc),
+            spectra,
+            happened,
+        }
+    }
+}
+
+impl Host for Scene {
+    fn tell(&mut self, event: Event) {
+        self.hearing.hear(event);
+    }
+
+    fn tick(&mut self, now: Duration, rig: &RigState) {
+        self.now = now;
+        if let (Phase::Faulted(fault), true) = (rig.phase, rig.phase != self.phase) {
+            self.hearing.happens(Happening::Refused {
+                why: fault.to_string(),
+            });
+        }
+        self.phase = rig.phase;
+    }
+
+    fn look(&mut self, rig: &mut SimRig) {
+        if let Some(texture) = self.texture.take()
+            && let Err(why) = rig.place(texture)
+        {
+            let why = why.to_string();
+            self.hearing.happens(Happening::Refused { why });
+        }
+        if let Some(wear) = self.wear
+            && rig.world().put_on_skin(wear).is_ok()
+        {
+            self.wear = None;
+        }
+        if (self.now.as_millis() as u64).is_multiple_of(PDC_MS) {
+            self.pdc.extend(rig.pdc().last());
+        }
+        self.truth = rig.world().truth();
+    }
+
+    fn pauses(&self) -> bool {
+        let pauses = self.until.is_some_and(|until| self.now >= until);
+        if pauses {
+            self.waits.set(true);
+        }
+        pauses
+    }
+
+    fn stops(&mut self) -> bool {
+        self.stop
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop
+    }
+
+    fn streams(&self) -> bool {
+        true
+    }
+}

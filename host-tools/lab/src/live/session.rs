@@ -1,0 +1,392 @@
+//! A probe that is asked, and goes on as far as it is let.
+
+use std::cell::RefCell;
+use std::future::Future;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::{Context, Waker};
+use std::time::Duration;
+
+use embassy_futures::yield_now;
+use tactus_core::dsp::Plain;
+use tactus_core::explorer::Method;
+use tactus_core::features::{Movement, Observation, Slide};
+use tactus_core::probe::seams::RigHandle as _;
+use tactus_core::rig::Rig as _;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::table::{Name, is_false_alarm};
+use tactus_core::wire::{self, Command, Identify};
+
+use super::message::{Happening, Measured, Reply, Request, Settings, movement_of};
+use super::scene::Scene;
+use super::slides::{Trials, WORLD, table};
+use super::standing::PLAN;
+use crate::sim::collection::{Collection, calibrated};
+use crate::sim::flash::{RamFlash, TABLE};
+use crate::sim::probe::{SimProbe, switch_on};
+use crate::sim::rig::SimRig;
+use tactus_world::textures::TEXTURES;
+use tactus_world::world::Setup;
+
+/// Everything that a probe does for one request.
+enum Job {
+    Serve(Box<Command>),
+    Move(Movement, u32),
+}
+
+impl Job {
+    /// With this texture under the finger.
+    fn on(self, texture: u8) -> Result<(Self, Option<u8>), &'static str> {
+        if !(1..=117).contains(&texture) {
+            return Err("textures have the numbers 1 to 117");
+        }
+        Ok((self, Some(texture)))
+    }
+}
+
+/// What waits for its turn.
+type Desk = Rc<RefCell<Option<(Job, Option<u8>)>>>;
+
+/// A world in the making.
+struct Preparing {
+    settings: Settings,
+    collection: Collection,
+    calibration: RigCalibration,
+    trials: Vec<Trials>,
+}
+
+/// A probe in its world.
+struct Running {
+    paper: bool,
+    scene: Rc<RefCell<Scene>>,
+    desk: Desk,
+    life: Pin<Box<dyn Future<Output = ()>>>,
+}
+
+/// Somebody watches a simulated probe.
+#[derive(Default)]
+pub struct Session {
+    preparing: Option<Preparing>,
+    running: Option<Running>,
+}
+
+type Answered = Result<Reply, Box<dyn std::error::Error>>;
+
+impl Session {
+    /// Does what is asked for, in JSON: a [`Request`], and a [`Reply`].
+    pub fn ask(&mut self, request: &str) -> String {
+        let reply = match serde_json::from_str(request) {
+            Ok(request) => self.answer(request).unwrap_or_else(|why| Reply::Error {
+                why: sentence(why.as_ref()),
+            }),
+            Err(why) => Reply::Error {
+                why: format!("no request: {why}"),
+            },
+        };
+        serde_json::to_string(&reply).unwrap_or_default()
+    }
+
+    fn answer(&mut self, request: Request) -> Answered {
+        match request {
+            Request::Textures => Ok(Reply::Textures {
+                names: TEXTURES.iter().map(|texture| texture.name).collect(),
+            }),
+            Request::World(settings) => self.begin(settings),
+            Request::Prepare => self.prepare(),
+            Request::Identify {
+                texture,
+                seed,
+                threshold,
+                false_alarm,
+                max_slides,
+            } => {
+                if !(threshold > 0.0 && threshold <= 1.0) {
+                    return Err("the threshold is a probability between 0 and 1".into());
+                }
+                if false_alarm.is_some_and(|share| !is_false_alarm(share)) {
+                    return Err("false alarms are a share from 0.0005 to 0.2".into());
+                }
+                if max_slides == 0 {
+                    return Err("at least one slide".into());
+                }
+                let running = self.idle()?;
+                let wanted = Identify {
+                    seed,
+                    threshold,
+                    false_alarm,
+                    max_slides,
+                    method: running.paper.then_some(Method::Paper),
+                    ..Identify::default()
+                };
+                let job = Job::Serve(Box::new(Command::Identify(wanted)));
+                running.follow(job.on(texture)?)
+            }
+            Request::Move {
+                texture,
+                seed,
+                force_n,
+                speed_mm_s,
+            } => {
+                let movement = Movement::from_si(force_n, speed_mm_s)?;
+                let running = self.idle()?;
+                running.follow(Job::Move(movement, seed).on(texture)?)
+            }
+            Request::Label { name } => {
+                let name = Name::try_from(name.trim()).map_err(|_| "the name is too long")?;
+                if name.is_empty() {
+                    return Err("a texture needs a name".into());
+                }
+                self.idle()?
+                    .follow((Job::Serve(Box::new(Command::Label(name))), None))
+            }
+            Request::Skin { wear } => {
+                self.running()?.scene.borrow_mut().wear = Some(wear.clamp(0.0, 1.0));
+                self.step(0)
+            }
+            Request::Stop => {
+                self.running()?.scene.borrow_mut().stop = true;
+                self.step(0)
+            }
+            Request::Step { ms } => self.step(ms),
+        }
+    }
+
+    fn begin(&mut self, settings: Settings) -> Answered {
+        if !(2..=117).contains(&settings.textures) {
+            return Err("a probe here knows 2 to 117 textures".into());
+        }
+        if !(0.0..=10.0).contains(&settings.drift) {
+            return Err("drift is 0 to 10 times the usual".into());
+        }
+        self.running = None;
+        let collection = Collection {
+            seed: settings.world,
+            textures: Collection::spread(1, settings.textures),
+            trials: super::TRIALS,
+        };
+        let trials = if settings.world == WORLD {
+            let mut all = Trials::of_world()?;
+            all.retain(|trials| collection.textures.contains(&trials.texture));
+            all
+        } else {
+            Vec::new()
+        };
+        let of = collection.textures.len();
+        let done = trials.len();
+        let calibration = calibrated(shimmed(collection.setup(1, 0)))?;
+        self.preparing = Some(Preparing {
+            settings,
+            collection,
+            calibration,
+            trials,
+        });
+        Ok(Reply::Preparing { done, of })
+    }
+
+    fn prepare(&mut self) -> Answered {
+        let mut now = self.preparing.take().ok_or("no world was asked for")?;
+        let of = now.collection.textures.len();
+        if let Some(&texture) = now.collection.textures.get(now.trials.len()) {
+            let made = Trials::make(now.collection.seed, texture, now.calibration)?;
+            now.trials.push(made);
+            let done = now.trials.len();
+            self.preparing = Some(now);
+            return Ok(Reply::Preparing { done, of });
+        }
+        let Preparing {
+            settings:
+                Settings {
+                    paper,
+                    drift,
+                    trial,
+                    ..
+                },
+            collection,
+            calibration,
+            trials,
+        } = now;
+        let factory = table(&trials, paper, drift)?;
+        let mut rig = SimRig::new(shimmed(collection.setup(1, 1 + trial)));
+        rig.control().calibrate(calibration)?;
+        rig.home()?;
+        let (scene, desk) = (Rc::new(RefCell::new(Scene::new())), Desk::default());
+        let life = live(rig, factory, Rc::clone(&scene), Rc::clone(&desk));
+        let mut running = Running {
+            paper,
+            scene,
+            desk,
+            life: Box::pin(life),
+        };
+        running.poll();
+        let known = running.scene.borrow().hearing.known().clone();
+        if known.textures.is_empty() {
+            return Err("the probe does not start".into());
+        }
+        self.running = Some(running);
+        Ok(Reply::Ready(known))
+    }
+
+    fn running(&mut self) -> Result<&mut Running, &'static str> {
+        self.running.as_mut().ok_or("there is no probe yet")
+    }
+
+    fn idle(&mut self) -> Result<&mut Running, &'static str> {
+        let running = self.running()?;
+        if running.scene.borrow().busy {
+            return Err("the probe is busy: stop it first");
+        }
+        Ok(running)
+    }
+
+    fn step(&mut self, ms: u32) -> Answered {
+        let running = self.running()?;
+        running.go_on(ms);
+        Ok(Reply::Frame(running.scene.borrow_mut().frame()))
+    }
+}
+
+/// Samples on shims, so that the finger's way down is short.
+fn shimmed(setup: Setup) -> Setup {
+    Setup {
+        shimmed: true,
+        ..setup
+    }
+}
+
+/// What went wrong, with its causes.
+pub fn sentence(why: &dyn std::error::Error) -> String {
+    let mut sentence = why.to_string();
+    let mut cause = why.source();
+    while let Some(deeper) = cause {
+        sentence = format!("{sentence}: {deeper}");
+        cause = deeper.source();
+    }
+    sentence
+}
+
+impl Running {
+    fn follow(&mut self, job: (Job, Option<u8>)) -> Answered {
+        self.scene.borrow_mut().busy = true;
+        *self.desk.borrow_mut() = Some(job);
+        Ok(Reply::Frame(self.scene.borrow_mut().frame()))
+    }
+
+    /// So much time passes, at most.
+    fn go_on(&mut self, ms: u32) {
+        {
+            let mut scene = self.scene.borrow_mut();
+            scene.until = Some(scene.now() + Duration::from_millis(ms.into()));
+        }
+        // a store that writes lets others go first, too: on until it waits for the time, or for a job
+        let goes_on = |running: &Self| {
+            let scene = running.scene.borrow();
+            scene.busy && !scene.waits.get()
+        };
+        self.scene.borrow().waits.set(false);
+        while {
+            self.poll();
+            goes_on(self)
+        } {}
+    }
+
+    fn poll(&mut self) {
+        let mut context = Context::from_waker(Waker::noop());
+        // it never ends
+        let _ = self.life.as_mut().poll(&mut context);
+    }
+}
+
+/// The life of a probe: it waits for jobs and does them.
+async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: Desk) {
+    let mut buffer = vec![0; TABLE];
+    let on = switch_on(rig, RamFlash::blank(), &factory, &mut buffer, &PLAN, &scene);
+    let mut probe = match on {
+        Ok(probe) => probe,
+        Err(why) => {
+            scene.borrow_mut().hearing.happens(Happening::Refused {
+                why: why.to_string(),
+            });
+            return std::future::pending().await;
+        }
+    };
+    let mut id = 0;
+    loop {
+        {
+            let mut scene = scene.borrow_mut();
+            scene.hearing.knows(probe.memory.in_force());
+            scene.hearing.learned();
+            scene.busy = false;
+            scene.stop = false;
+            // nothing moves: whatever is due is done
+            scene.until = None;
+        }
+        let (job, texture) = loop {
+            if let Some(job) = desk.borrow_mut().take() {
+                break job;
+            }
+            yield_now().await;
+        };
+        // a new request gets its time with the next step
+        scene.borrow_mut().busy = true;
+        if let Some(texture) = texture.filter(|texture| scene.borrow().texture() != *texture) {
+            // whoever changes the sample lifts the finger out of the way first
+            let lifted = probe.rig.lift().await;
+            scene.borrow_mut().place(texture, lifted);
+        }
+        match job {
+            Job::Serve(command) => {
+                let command = *command;
+                if let (Command::Identify(wanted), Ok(table)) = (&command, probe.memory.table()) {
+                    let config = wanted.config(table.contents());
+                    scene.borrow_mut().hearing.explores(config);
+                }
+                id = u16::wrapping_add(id, 1);
+                let request = wire::Request { id, command };
+                probe.serve::<Plain>(&request).await;
+            }
+            Job::Move(movement, seed) => {
+                let made = make(&mut probe, &scene, movement, seed).await;
+                scene.borrow_mut().hearing.happens(made);
+                scene.borrow_mut().hearing.happens(Happening::Done);
+            }
+        }
+    }
+}
+
+/// One movement.
+async fn make<'p>(
+    probe: &mut SimProbe<'p, Scene>,
+    scene: &RefCell<Scene>,
+    movement: Movement,
+    seed: u32,
+) -> Happening {
+    probe.memory.episode = None;
+    probe.rig.begin(seed).await;
+    let mut slide = Slide::<Plain>::new(&PLAN, movement);
+    let made = match probe.rig.perform(&mut slide).await {
+        Ok(()) => probe.rig.lifted().await,
+        Err(why) => Err(why),
+    };
+    if let Err(why) = made {
+        return Happening::Refused {
+            why: why.to_string(),
+        };
+    }
+    match slide.finish() {
+        Err(why) => Happening::Rejected {
+            why: why.to_string(),
+        },
+        Ok(measurement) => {
+            let seen = Observation::from(&measurement);
+            let table = probe.memory.table().ok();
+            let at = table.and_then(|table| movement_of(table, movement));
+            Happening::Moved {
+                movement: at,
+                place: at
+                    .zip(table)
+                    .and_then(|(at, table)| scene.borrow().hearing.place_of(table, at, &seen)),
+                measured: Measured::new(movement, &seen),
+            }
+        }
+    }
+}

@@ -1,0 +1,576 @@
+//! The textures of a simulated world: recorded trial by trial, and learned.
+
+use std::fmt;
+use std::path::Path;
+
+use rayon::prelude::*;
+use tactus_core::dsp::Plan;
+use tactus_core::explorer::Method;
+use tactus_core::features::{FeatureSet, Movement, Observation, SlideError};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::sensor::{FingerCode, FingerName};
+
+use crate::data::recording::{Labels, Recording, Texture};
+use crate::data::recordings::{RecordingError, RecordingWriter};
+use crate::data::replay::measure;
+use crate::eval::learn::{self, Expected, ObservedTrial, TableError};
+use crate::sim::rig::{SimError, SimRig};
+use tactus_world::textures::TEXTURES;
+use tactus_world::world::Setup;
+
+/// Textures of a simulated world, to record and to learn.
+#[derive(Clone, Debug)]
+pub struct Collection {
+    /// The world's seed: what its textures, motors and fingertip are like.
+    pub seed: u64,
+    /// Numbers of the textures in Table 1.
+    pub textures: Vec<u8>,
+    /// Trials of each texture and movement.
+    pub trials: u32,
+}
+
+impl Collection {
+    /// The movements of the study.
+    pub const MOVEMENTS: [Movement; 3] = [
+        Movement::FOR_TRACTION,
+        Movement::FOR_FINENESS,
+        Movement::FOR_ROUGHNESS,
+    ];
+
+    /// The lengths after which a slide may end, ms at constant speed, where nothing else is asked for.
+    pub const LENGTHS_MS: [u16; 3] = [500, 1000, 2000];
+
+    /// The textures of a collection of `among` that holds `unknown`: the others are spread over Table 1.
+    pub fn spread(unknown: u8, among: u8) -> Vec<u8> {
+        let others = u16::from(among.clamp(1, 117)) - 1;
+        let mut textures: Vec<u8> = (0..others)
+            .map(|n| (n * 116 / others) as u8 + 1)
+            .map(|number| number + u8::from(number >= unknown))
+            .collect();
+        textures.push(unknown);
+        textures.sort_unstable();
+        textures
+    }
+
+    /// Begins a folder of recordings of it, or goes on with one that was interrupted.
+    ///
+    /// # Errors
+    /// The folder cannot be written, or holds other recordings.
+    pub fn writer(
+        &self,
+        folder: &Path,
+        finger: FingerName,
+    ) -> Result<RecordingWriter, RecordingError> {
+        let named = self.textures.iter().map(|&number| Texture {
+            id: number.into(),
+            name: texture_name(number).to_owned(),
+        });
+        let numbers: Vec<String> = self.textures.iter().map(u8::to_string).collect();
+        let (seed, trials, numbers) = (self.seed, self.trials, numbers.join(","));
+        let finger_said = match finger {
+            FingerName::Biotac => String::new(),
+            other => format!(" --finger {other}"),
+        };
+        let command = format!(
+            "tactus simulate --seed {seed} --trials {trials} --textures {numbers}{finger_said}"
+        );
+        let labels = Labels {
+            finger: FingerCode::of(finger),
+            ..Labels::default()
+        };
+        let writer = RecordingWriter::begin(folder, named.collect(), &command)?;
+        Ok(writer.labelled(labels))
+    }
+
+    /// A rig of this world with a texture under it. Different trials of one texture are `trial` apart.
+    pub fn setup(&self, texture: u8, trial: u64) -> Setup {
+        Setup {
+            texture,
+            world_seed: self.seed,
+            trial_seed: self
+                .seed
+                .wrapping_mul(1_000_003)
+                .wrapping_add(u64::from(texture))
+                .wrapping_mul(1009)
+                + trial,
+            finger_seed: self.seed,
+            ..Setup::default()
+        }
+    }
+
+    /// The same with another finger than a BioTac.
+    pub fn setup_with(&self, finger: FingerName, texture: u8, trial: u64) -> Setup {
+        Setup {
+            finger,
+            ..self.setup(texture, trial)
+        }
+    }
+
+    /// Names of the textures.
+    pub fn names(&self) -> Vec<String> {
+        self.textures
+            .iter()
+            .map(|&number| texture_name(number).to_owned())
+            .collect()
+    }
+
+    /// Records all trials of all textures, textures side by side; `done` hears of each. Per texture, its slides in the
+    /// order of time.
+    ///
+    /// # Errors
+    /// The first fault of a rig.
+    pub fn record(
+        &self,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<Recording>>, TrialError> {
+        self.record_with(FingerName::Biotac, calibration, done)
+    }
+
+    /// The same with another finger than a BioTac.
+    ///
+    /// # Errors
+    /// The first fault of a rig.
+    pub fn record_with(
+        &self,
+        finger: FingerName,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<Recording>>, TrialError> {
+        self.record_at(finger, &Self::MOVEMENTS, calibration, done)
+    }
+
+    fn record_at(
+        &self,
+        finger: FingerName,
+        movements: &[Movement],
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<Recording>>, TrialError> {
+        self.textures
+            .par_iter()
+            .enumerate()
+            .map(|(index, &texture)| {
+                let setup = self.setup_with(finger, texture, 0);
+                let mut slides = record_texture(setup, calibration, movements, self.trials)?;
+                for slide in &mut slides {
+                    slide.texture = index;
+                }
+                done();
+                Ok(slides)
+            })
+            .collect()
+    }
+
+    /// Learns a texture table for a method from trials of all textures.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn(
+        &self,
+        method: Method,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        self.learn_at(&Self::MOVEMENTS, method, calibration, done)
+    }
+
+    /// As [`Collection::learn`], of these movements.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn_at(
+        &self,
+        movements: &[Movement],
+        method: Method,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        self.learn_with(FingerName::Biotac, movements, method, calibration, done)
+    }
+
+    /// The same with another finger than a BioTac.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn_with(
+        &self,
+        finger: FingerName,
+        movements: &[Movement],
+        method: Method,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let slides = self.record_at(finger, movements, calibration, done)?;
+        let table = self.learn_from(movements, method, &slides)?;
+        let named = learn::name_finger(&table, FingerCode::of(finger), 0);
+        Ok(named.map_err(TableError::from)?)
+    }
+
+    /// A fused table for a rig that does not measure shear, as one that an arm moves: of band powers alone.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties.
+    pub fn learn_without_shear(
+        &self,
+        calibration: RigCalibration,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let movements = &Self::MOVEMENTS;
+        let slides = self.record(calibration, done)?;
+        let measured = self.measure(movements, &slides)?;
+        let bands = Some(FeatureSet::Bands);
+        let table = learn::learn(Method::Fused, bands, &self.names(), movements, &measured)?;
+        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+        Ok(named.map_err(TableError::from)?)
+    }
+
+    /// As [`Collection::learn`], with what slides say after each of these lengths, in ms at constant speed, the shortest first.
+    ///
+    /// # Errors
+    /// The first fault of a rig, or slide without properties; lengths that no table has.
+    pub fn learn_lengths(
+        &self,
+        method: Method,
+        calibration: RigCalibration,
+        lengths_ms: &[u16],
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<u8>, LearnError> {
+        let slides = self.record(calibration, done)?;
+        let plan = Plan::new();
+        let trials = slides.iter().zip(&self.textures).map(|(slides, &texture)| {
+            self.observe(&plan, &Self::MOVEMENTS, texture, slides, lengths_ms)
+        });
+        let trials = trials.collect::<Result<Vec<_>, TrialError>>()?;
+        let usual = Expected::default();
+        let (names, movements) = (self.names(), &Self::MOVEMENTS);
+        let table = learn::learn_lengths(&usual, method, &names, movements, lengths_ms, &trials)?;
+        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+        Ok(named.map_err(TableError::from)?)
+    }
+
+    /// What the slides of a texture say, whole and after each of these lengths, in ms at constant speed: movement by movement.
+    ///
+    /// # Errors
+    /// [`TrialError::Slide`].
+    pub fn observe(
+        &self,
+        plan: &Plan,
+        movements: &[Movement],
+        texture: u8,
+        slides: &[Recording],
+        lengths_ms: &[u16],
+    ) -> Result<Vec<Vec<ObservedTrial>>, TrialError> {
+        let of_movement = |movement: &Movement| {
+            let trials = slides.iter().filter(|s| s.movement == *movement);
+            let observed = (1..).zip(trials).map(|(trial, slide)| {
+                let at = Trial {
+                    world: self.seed,
+                    texture,
+                    slide: Some((*movement, trial)),
+                };
+                let first = lengths_ms.iter().map(|&ms| {
+                    let first = slide.first(ms);
+                    first.map(|first| at.measure(plan, &first)).transpose()
+                });
+                Ok(ObservedTrial {
+                    first: first.collect::<Result<_, _>>()?,
+                    whole: at.measure(plan, slide)?,
+                })
+            });
+            observed.collect()
+        };
+        movements.iter().map(of_movement).collect()
+    }
+
+    /// The table of these slides, each texture's in the order of time.
+    fn learn_from(
+        &self,
+        movements: &[Movement],
+        method: Method,
+        slides: &[Vec<Recording>],
+    ) -> Result<Vec<u8>, LearnError> {
+        let measured = self.measure(movements, slides)?;
+        Ok(learn::learn(
+            method,
+            None,
+            &self.names(),
+            movements,
+            &measured,
+        )?)
+    }
+
+    /// What these slides say: of each texture, of each movement, of each trial.
+    fn measure(
+        &self,
+        movements: &[Movement],
+        slides: &[Vec<Recording>],
+    ) -> Result<Vec<Vec<Vec<Observation>>>, TrialError> {
+        let plan = Plan::new();
+        let whole = |slides: Vec<Vec<ObservedTrial>>| -> Vec<Vec<Observation>> {
+            let cells = slides.into_iter();
+            let whole = |cell: Vec<ObservedTrial>| cell.into_iter().map(|trial| trial.whole);
+            cells.map(|cell| whole(cell).collect()).collect()
+        };
+        let measured = slides.iter().zip(&self.textures).map(|(slides, &texture)| {
+            self.observe(&plan, movements, texture, slides, &[])
+                .map(whole)
+        });
+        measured.collect()
+    }
+}
+
+/// Where in a simulated world something failed.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Trial {
+    /// The world's seed.
+    pub world: u64,
+    /// Number of the texture in Table 1.
+    pub texture: u8,
+    /// The movement and the number of the trial, from 1; before the first, the rig powers up.
+    pub slide: Option<(Movement, u32)>,
+}
+
+impl Trial {
+    /// What the rig made in this trial.
+    ///
+    /// # Errors
+    /// [`TrialError::Rig`].
+    pub fn made<T>(self, made: Result<T, SimError>) -> Result<T, TrialError> {
+        made.map_err(|source| TrialError::Rig { at: self, source })
+    }
+
+    /// The features of a slide of this trial.
+    ///
+    /// # Errors
+    /// [`TrialError::Slide`].
+    pub fn measure(self, plan: &Plan, slide: &Recording) -> Result<Observation, TrialError> {
+        let measured =
+            measure(plan, slide).map_err(|source| TrialError::Slide { at: self, source })?;
+        Ok(Observation::from(&measured))
+    }
+}
+
+impl fmt::Display for Trial {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (texture, name) = (self.texture, texture_name(self.texture));
+        write!(f, "world {}, T{texture} {name}, ", self.world)?;
+        match self.slide {
+            Some((movement, trial)) => write!(f, "{movement}, trial {trial}"),
+            None => write!(f, "at power-up"),
+        }
+    }
+}
+
+/// Why a trial in a simulated world gave nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// The rig failed.
+    #[error("{at}: the simulated rig failed; another seed makes another world")]
+    Rig {
+        /// Where.
+        at: Trial,
+        /// How.
+        source: SimError,
+    },
+    /// The slide has no properties.
+    #[error("{at}: the slide has no properties; another seed makes another world")]
+    Slide {
+        /// Where.
+        at: Trial,
+        /// Why.
+        source: SlideError,
+    },
+}
+
+/// Why no table was learned in a simulated world.
+#[derive(Debug, thiserror::Error)]
+pub enum LearnError {
+    /// A rig failed.
+    #[error(transparent)]
+    Rig(#[from] SimError),
+    /// A trial gave nothing.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+    /// A recorded slide has no properties on the simulated rig.
+    #[error(
+        "slide {slide} of {texture} has no properties on the simulated rig; play other recordings"
+    )]
+    Slide {
+        /// Name of the texture.
+        texture: String,
+        /// Which of the slides to learn from, from 1.
+        slide: usize,
+        /// Why.
+        source: SlideError,
+    },
+    /// The table cannot be learned.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+/// Name of a texture by its number in Table 1.
+pub fn texture_name(number: u8) -> &'static str {
+    TEXTURES
+        .iter()
+        .find(|t| t.number == number)
+        .map_or("?", |t| t.name)
+}
+
+/// A name as a shell takes it without quotes: "plastic-mesh-5-mm".
+pub fn plain_name(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    words.join("-").to_lowercase()
+}
+
+/// Number of a texture by its name in Table 1, whatever its capitals and what is between its words, or by its number.
+pub fn texture_number(name: &str) -> Option<u8> {
+    let number = name.trim_start_matches(['T', 't']).parse().ok();
+    let plain = plain_name(name);
+    TEXTURES
+        .iter()
+        .find(|t| plain_name(t.name) == plain || Some(t.number) == number)
+        .map(|t| t.number)
+}
+
+/// Measures the unloaded current of the rig of a world once; all rigs of that world have the same motor.
+///
+/// # Errors
+/// See [`SimError`].
+pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
+    let mut rig = SimRig::new(setup);
+    rig.home()?;
+    rig.calibrate_current()
+}
+
+/// Trials of one texture at every movement, movement by movement, numbered in the order of time.
+///
+/// # Errors
+/// See [`TrialError`].
+pub fn record_texture(
+    setup: Setup,
+    calibration: RigCalibration,
+    movements: &[Movement],
+    trials: u32,
+) -> Result<Vec<Recording>, TrialError> {
+    let mut slides = Vec::new();
+    let mut rig = SimRig::new(setup);
+    let at = Trial {
+        world: setup.world_seed,
+        texture: setup.texture,
+        slide: None,
+    };
+    record_trials(
+        &mut rig,
+        at,
+        calibration,
+        movements,
+        trials,
+        |_, at, slide| {
+            slides.push(Recording {
+                number: slides.len() as u32 + 1,
+                ..at.made(slide)?
+            });
+            Ok(Next::Trial)
+        },
+    )?;
+    Ok(slides)
+}
+
+/// What comes after a trial.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Next {
+    /// The next one.
+    Trial,
+    /// The next movement, on a rig that has homed again.
+    Movement,
+}
+
+/// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide, or why the rig did
+/// not make it, and says what comes next.
+///
+/// # Errors
+/// See [`TrialError`], and what `each` returns.
+pub fn record_trials(
+    rig: &mut SimRig,
+    at: Trial,
+    calibration: RigCalibration,
+    movements: &[Movement],
+    trials: u32,
+    mut each: impl FnMut(&mut SimRig, Trial, Result<Recording, SimError>) -> Result<Next, TrialError>,
+) -> Result<(), TrialError> {
+    let calibrated = rig.control().calibrate(calibration).map_err(SimError::from);
+    at.made(calibrated.and_then(|()| rig.home()))?;
+    for &movement in movements {
+        for trial in 1..=trials {
+            let at = Trial {
+                slide: Some((movement, trial)),
+                ..at
+            };
+            let slide = rig.record(movement);
+            if each(rig, at, slide)? == Next::Movement {
+                let reset = rig.control().reset().map_err(SimError::from);
+                at.made(reset.and_then(|()| rig.home()))?;
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod hard_worlds;
+
+#[cfg(test)]
+mod tests {
+    use tactus_core::table::{Contents, Table, factory};
+
+    use super::*;
+
+    /// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this simulator. All of
+    /// each is compared by `cargo xtask factory --check`.
+    #[test]
+    fn factory_tables_are_of_this_world() {
+        // the image of this one ends slides early
+        let lengths = Table::read(factory::RIG).unwrap();
+        assert!(lengths.lengths_ms().eq(Collection::LENGTHS_MS));
+        let plan = Plan::new();
+        for finger in FingerName::ALL {
+            let table = Table::read(factory::rig(finger)).unwrap();
+            let Contents::Fused(set, features) = table.contents() else {
+                panic!("{finger}: {:?}", table.contents());
+            };
+            let collection = Collection {
+                seed: 1,
+                textures: (1..=117).step_by(29).collect(),
+                trials: 5,
+            };
+            let calibration = calibrated(collection.setup_with(finger, 1, 0)).unwrap();
+            let slides = collection.record_with(finger, calibration, || ());
+            let slides = slides.unwrap();
+            for (slides, &texture) in slides.iter().zip(&collection.textures) {
+                let movements = &Collection::MOVEMENTS;
+                let observed = collection.observe(&plan, movements, texture, slides, &[]);
+                for (movement, trials) in (0..).zip(observed.unwrap()) {
+                    let vectors = trials.iter().map(|trial| {
+                        let vector = trial.whole.vector(set, features.into()).unwrap();
+                        table.whiten(movement, &vector).unwrap()
+                    });
+                    let vectors: Vec<_> = vectors.collect();
+                    let known = table.white_mean(u16::from(texture) - 1, movement);
+                    for (axis, known) in known.enumerate() {
+                        let sum: f64 = vectors.iter().map(|v| f64::from(v[axis])).sum();
+                        let mean = sum / vectors.len() as f64;
+                        // two roundings
+                        assert!(
+                            (mean - f64::from(known)).abs() <= 2.0,
+                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if simulator or features \
+                             were changed on purpose: cargo xtask factory"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

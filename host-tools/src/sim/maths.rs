@@ -1,9 +1,0 @@
-//! Functions of real numbers that IEEE 754 leaves to a library, from `libm`: a platform's own differ in the last bit, and a
-//! world would be another one there. Clippy keeps std's out of this room (`disallowed-methods`).
-
-pub(super) use libm::{cbrt, cos, exp, log as ln, pow, sin, sincos as sin_cos, tan};
-
-/// x^2: the precision of std's `powi` is unspecified.
-pub(super) fn square(x: f64) -> f64 {
-    x * x
-}

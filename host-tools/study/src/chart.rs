@@ -1,0 +1,414 @@
+//! Charts as SVG: how they are drawn, whatever they show.
+
+pub(crate) mod grid;
+mod labels;
+pub(crate) mod matrix;
+mod svg;
+
+use plotters::prelude::*;
+
+use labels::{Area, lines, place, width};
+pub(crate) use svg::{COLOURS, EM, GREY, WIDTH};
+pub use svg::{DrawError, Figure, escaped};
+use svg::{FONT, Failed, From, INK, Root, TEXT, Tip, caption, figure, write};
+
+/// What stands at a point.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Mark {
+    /// Nothing: only the line.
+    None,
+    Circle,
+    Cross,
+    Triangle,
+    Square,
+}
+
+/// The marks in the order in which series take them: the colour alone is not enough for every eye.
+pub(crate) const MARKS: [Mark; 4] = [Mark::Circle, Mark::Triangle, Mark::Square, Mark::Cross];
+
+/// Points of one kind.
+pub(crate) struct Series {
+    /// Written at the last point, or in the legend; empty for none.
+    pub(crate) name: String,
+    pub(crate) colour: RGBColor,
+    pub(crate) mark: Mark,
+    /// Whether a line joins them; dashed if they are only there for comparison.
+    pub(crate) line: Option<Line>,
+    /// Of the line, px.
+    pub(crate) width: u32,
+    pub(crate) points: Vec<(f64, f64)>,
+    /// Lower and upper end of each point's error bar; none where it is empty.
+    pub(crate) bars: Vec<(f64, f64)>,
+    /// Written beside each point where there is room; nothing where it is empty.
+    pub(crate) labels: Vec<String>,
+    /// What each point says to those who point at it; nothing where it is empty.
+    pub(crate) says: Vec<String>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Line {
+    Whole,
+    Dashed,
+}
+
+impl Series {
+    /// Points that nothing joins, in one of [`COLOURS`].
+    pub(crate) fn points(
+        colour: usize,
+        mark: Mark,
+        name: impl Into<String>,
+        points: Vec<(f64, f64)>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            colour: COLOURS[colour % COLOURS.len()],
+            mark,
+            line: None,
+            width: 2,
+            points,
+            bars: Vec::new(),
+            labels: Vec::new(),
+            says: Vec::new(),
+        }
+    }
+
+    /// Points that a line joins.
+    pub(crate) fn curve(
+        colour: usize,
+        mark: Mark,
+        name: impl Into<String>,
+        points: Vec<(f64, f64)>,
+    ) -> Self {
+        Self {
+            line: Some(Line::Whole),
+            ..Self::points(colour, mark, name, points)
+        }
+    }
+
+    /// A grey line that is only there for comparison.
+    pub(crate) fn dashed(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self {
+            colour: GREY,
+            line: Some(Line::Dashed),
+            ..Self::points(0, Mark::None, name, points)
+        }
+    }
+}
+
+/// A chart.
+pub(crate) struct Chart<'a> {
+    pub(crate) title: String,
+    /// Whether the title is written above it, too.
+    pub(crate) titled: bool,
+    /// What it shows, for those who cannot see it; empty where the title says it.
+    pub(crate) about: String,
+    /// What an axis shows, with its unit.
+    pub(crate) x: &'a str,
+    pub(crate) y: &'a str,
+    pub(crate) x_range: (f64, f64),
+    pub(crate) y_range: (f64, f64),
+    /// Number of marks on the x axis, and what stands there.
+    pub(crate) x_marks: usize,
+    pub(crate) x_text: &'a dyn Fn(f64) -> String,
+    /// Number of marks on the y axis.
+    pub(crate) y_marks: usize,
+    /// A part of the x axis that is shaded, and why.
+    pub(crate) span: Option<((f64, f64), &'a str)>,
+    /// Names at the ends of the lines rather than in a legend.
+    pub(crate) named_at_end: bool,
+    /// Words below it.
+    pub(crate) below: &'a str,
+    /// px
+    pub(crate) size: (u32, u32),
+    pub(crate) series: Vec<Series>,
+}
+
+/// Of one panel, px.
+pub(crate) const PANEL: (u32, u32) = (WIDTH, 350);
+/// Height of a line of words, px.
+const LINE: i32 = TEXT as i32 + 2;
+
+/// Range that holds all values, with a little room.
+pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(v), h.max(v))
+        });
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let buffer = (0.06 * (high - low)).max(1e-6);
+    (low - buffer, high + buffer)
+}
+
+/// A number for an axis.
+fn plain(value: f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    format!("{}", rounded + 0.0)
+}
+
+/// Draws curves over the same x as SVG, each with its name.
+///
+/// # Errors
+/// See [`DrawError`].
+pub fn curves(
+    title: &str,
+    x: &str,
+    y: &str,
+    curves: &[(&str, Vec<(f64, f64)>)],
+) -> Result<String, DrawError> {
+    let series = curves.iter().enumerate();
+    let series = series.map(|(n, (name, points))| {
+        Series::curve(
+            n % MARKS.len(),
+            MARKS[n % MARKS.len()],
+            *name,
+            points.clone(),
+        )
+    });
+    let x_range = buffer(
+        curves
+            .iter()
+            .flat_map(|(_, points)| points)
+            .map(|(x, _)| *x),
+    );
+    let chart = Chart::new(title, x, y, x_range, series.collect());
+    Ok(chart.figure("")?.svg)
+}
+
+impl<'a> Chart<'a> {
+    /// A chart of the size of a panel whose y axis has room for all points, six marks on the x axis, and a legend.
+    pub(crate) fn new(
+        title: impl Into<String>,
+        x: &'a str,
+        y: &'a str,
+        x_range: (f64, f64),
+        series: Vec<Series>,
+    ) -> Self {
+        let bars = series.iter().flat_map(|s| &s.bars);
+        let bars = bars.flat_map(|&(low, high)| [low, high]);
+        let points = series.iter().flat_map(|s| &s.points).map(|p| p.1);
+        Self {
+            title: title.into(),
+            titled: true,
+            about: String::new(),
+            x,
+            y,
+            x_range,
+            y_range: buffer(points.chain(bars)),
+            x_marks: 6,
+            x_text: &plain,
+            y_marks: 6,
+            span: None,
+            named_at_end: false,
+            below: "",
+            size: PANEL,
+            series,
+        }
+    }
+
+    /// Height of these words below a chart, px.
+    pub(crate) fn height_of(below: &str) -> u32 {
+        (LINE * lines(below, EM, WIDTH as i32 - 16).len() as i32) as u32
+    }
+
+    /// Draws it.
+    ///
+    /// # Errors
+    /// See [`DrawError`].
+    pub(crate) fn figure(self, id: impl Into<String>) -> Result<Figure, DrawError> {
+        figure(id, &self.title, &self.about, self.size, |root| {
+            Ok(self.draw(root)?.1)
+        })
+    }
+
+    /// Draws it, and says where in the drawing the area between the axes is, and what its points say.
+    fn draw(&self, root: &Root<'_>) -> Result<(Area, Vec<Tip>), Failed> {
+        let (full, tall) = (self.size.0 as i32, self.size.1 as i32);
+        let mut top = match self.titled {
+            true => caption(root, &self.title, self.size.0)? as i32,
+            false => 4,
+        };
+        if !self.named_at_end {
+            top = self.legend(root, top)?;
+        }
+        let names = self.series.iter().map(|s| width(&s.name, EM));
+        let right = match names.max() {
+            Some(longest) if self.named_at_end => longest + 30,
+            _ => 16,
+        };
+        let below = lines(self.below, EM, full - 16);
+        let below: Vec<&String> = below.iter().filter(|line| !line.is_empty()).collect();
+        let under = LINE * below.len() as i32;
+        for (line, y) in below
+            .iter()
+            .zip((tall - under + 4..).step_by(LINE as usize))
+        {
+            write(root, line, (8, y), From::Left, BLACK)?;
+        }
+        let mut on = ChartBuilder::on(root);
+        on.margin(6)
+            .margin_top(top)
+            .margin_right(right)
+            .margin_bottom(6 + under)
+            .x_label_area_size(if self.x.is_empty() { 24 } else { 48 })
+            .y_label_area_size(70);
+        let (x_range, y_range) = (self.x_range, self.y_range);
+        let mut drawn = on.build_cartesian_2d(x_range.0..x_range.1, y_range.0..y_range.1)?;
+        let (x_text, y_text) = (|x: &f64| (self.x_text)(*x), |y: &f64| plain(*y));
+        let mut mesh = drawn.configure_mesh();
+        mesh.x_desc(self.x)
+            .y_desc(self.y)
+            .x_labels(self.x_marks)
+            .y_labels(self.y_marks)
+            .x_label_formatter(&x_text)
+            .y_label_formatter(&y_text)
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(BLACK.mix(0.12))
+            .label_style((FONT, TEXT))
+            .axis_desc_style((FONT, TEXT));
+        if self.series.is_empty() {
+            mesh.disable_mesh();
+        }
+        mesh.draw()?;
+        if let Some(((from, to), _)) = self.span {
+            let corners = [(from, y_range.0), (to, y_range.1)];
+            drawn.draw_series([Rectangle::new(corners, SPAN.mix(SPAN_SHADE).filled())])?;
+        }
+        for series in &self.series {
+            let style = series.colour.stroke_width(series.width);
+            match series.line {
+                Some(Line::Whole) => {
+                    drawn.draw_series([PathElement::new(series.points.clone(), style)])?;
+                }
+                Some(Line::Dashed) => {
+                    let ends = series.points.windows(2);
+                    let dashes = ends.flat_map(|ends| self.dashes(ends[0], ends[1]));
+                    drawn.draw_series(dashes.map(|dash| PathElement::new(dash, style)))?;
+                }
+                None => {}
+            }
+            let bars = series.points.iter().zip(&series.bars);
+            let bars = bars.map(|(&(x, _), &(low, high))| vec![(x, low), (x, high)]);
+            drawn.draw_series(bars.map(|bar| PathElement::new(bar, style)))?;
+        }
+        let area = drawn.plotting_area();
+        let (x, y) = (area.get_x_axis_pixel_range(), area.get_y_axis_pixel_range());
+        let [left, right] = [x.start.min(x.end), x.start.max(x.end)];
+        let [top, bottom] = [y.start.min(y.end), y.start.max(y.end)];
+        let mut tips = Vec::new();
+        let (mut ends, mut points, mut labels): (Vec<i32>, Vec<_>, Vec<_>) = Default::default();
+        for series in &self.series {
+            let at: Vec<(i32, i32)> = series
+                .points
+                .iter()
+                .map(|p| area.map_coordinate(p))
+                .collect();
+            for &at in &at {
+                mark(root, series, at)?;
+            }
+            tips.extend(at.iter().zip(&series.says).map(|(&(x, y), says)| Tip {
+                area: [x - 8, y - 8, x + 8, y + 8],
+                says: says.clone(),
+            }));
+            points.extend(at.iter().zip(&series.labels).map(|(at, _)| *at));
+            labels.extend(series.labels.iter().cloned());
+            if let (true, false, Some(&(x, mut y))) =
+                (self.named_at_end, series.name.is_empty(), at.last())
+            {
+                // names do not cover each other, nor what is written below the axis
+                let away = if y > (top + bottom) / 2 { -1 } else { 1 };
+                while ends.iter().any(|other| (other - y).abs() < LINE - 3) {
+                    y += away;
+                }
+                ends.push(y);
+                mark(root, series, (x + 13, y))?;
+                write(root, &series.name, (x + 21, y), From::Left, BLACK)?;
+            }
+        }
+        let inside = [left + 2, top + 2, right - 2, bottom - 2];
+        let placed = place(&points, &labels, EM, inside, &[]);
+        for ((at, label), middle) in points.iter().zip(&labels).zip(placed) {
+            let Some((x, y)) = middle else { continue };
+            let half = width(label, EM) / 2;
+            let near = ((at.0).clamp(x - half, x + half), (at.1).clamp(y - 8, y + 8));
+            if (near.0 - at.0).abs() + (near.1 - at.1).abs() > 12 {
+                root.draw(&PathElement::new(vec![*at, near], BLACK.mix(0.4)))?;
+            }
+            write(root, label, (x, y), From::Middle, INK)?;
+        }
+        Ok(([left, top, right, bottom], tips))
+    }
+
+    /// Writes the legend below the title, in as many lines as it takes; gives the px down to its end.
+    fn legend(&self, root: &Root<'_>, top: i32) -> Result<i32, Failed> {
+        const SIGN: i32 = 30;
+        let (mut x, mut y) = (10, top + 8);
+        let mut next = |name: &str| {
+            let wide = SIGN + width(name, EM) + 12;
+            if x > 10 && x + wide > self.size.0 as i32 {
+                (x, y) = (10, y + LINE);
+            }
+            x += wide;
+            (x - wide, y)
+        };
+        let mut is_empty = true;
+        for series in self.series.iter().filter(|s| !s.name.is_empty()) {
+            let (x, y) = next(&series.name);
+            let style = series.colour.stroke_width(2);
+            let lines: &[[i32; 2]] = match series.line {
+                Some(Line::Whole) => &[[0, 24]],
+                Some(Line::Dashed) => &[[0, 9], [14, 24]],
+                None => &[],
+            };
+            for [from, to] in lines {
+                root.draw(&PathElement::new(vec![(x + from, y), (x + to, y)], style))?;
+            }
+            mark(root, series, (x + 12, y))?;
+            write(root, &series.name, (x + SIGN, y), From::Left, BLACK)?;
+            is_empty = false;
+        }
+        if let Some((_, name)) = self.span.filter(|(_, name)| !name.is_empty()) {
+            let (x, y) = next(name);
+            let corners = [(x, y - 6), (x + 24, y + 6)];
+            root.draw(&Rectangle::new(corners, SPAN.mix(SPAN_SHADE).filled()))?;
+            write(root, name, (x + SIGN, y), From::Left, BLACK)?;
+            is_empty = false;
+        }
+        Ok(if is_empty { top } else { y + LINE - 6 })
+    }
+
+    /// Cuts a line into dashes of about a 60th of the chart.
+    fn dashes(&self, from: (f64, f64), to: (f64, f64)) -> Vec<Vec<(f64, f64)>> {
+        let part = |a: f64, b: f64, range: (f64, f64)| ((b - a) / (range.1 - range.0)).abs();
+        let length = part(from.0, to.0, self.x_range).max(part(from.1, to.1, self.y_range));
+        let dashes = ((60.0 * length).ceil() as usize).max(1);
+        let at = |dash: usize| {
+            let share = (dash as f64 / dashes as f64).min(1.0);
+            let between = |a: f64, b: f64| a + (b - a) * share;
+            (between(from.0, to.0), between(from.1, to.1))
+        };
+        let dashes = (0..dashes).step_by(2);
+        dashes.map(|d| vec![at(d), at(d + 1)]).collect()
+    }
+}
+
+/// Colour of a part of an axis, and how much of it.
+const SPAN: RGBColor = COLOURS[4];
+const SPAN_SHADE: f64 = 0.25;
+
+/// Draws the mark of a series.
+fn mark(root: &Root<'_>, series: &Series, at: (i32, i32)) -> Result<(), Failed> {
+    let filled = series.colour.filled();
+    match series.mark {
+        Mark::None => Ok(()),
+        Mark::Circle => root.draw(&Circle::new(at, 3, filled)),
+        Mark::Cross => root.draw(&Cross::new(at, 3, series.colour.stroke_width(2))),
+        Mark::Triangle => root.draw(&TriangleMarker::new(at, 4, filled)),
+        Mark::Square => {
+            let (x, y) = at;
+            root.draw(&Rectangle::new([(x - 3, y - 3), (x + 3, y + 3)], filled))
+        }
+    }
+}

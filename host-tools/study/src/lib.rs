@@ -1,0 +1,21 @@
+//! The paper's whole study on the simulated rig: the pilot that finds the movements, the training, the eight pairs, and the
+//! identification among all 117 textures, beside the published numbers.
+
+pub mod chart;
+mod error;
+pub mod fabricslide;
+pub mod growth;
+pub mod identify;
+pub mod page;
+pub mod pictures;
+pub mod pilot;
+pub mod published;
+pub mod report;
+mod results;
+pub mod signals;
+pub mod slides;
+pub mod training;
+
+pub use error::StudyError;
+pub use results::{Study, VARIATION};
+pub use slides::Named;

@@ -1,0 +1,77 @@
+//! A control chart: how far each reading is from the mean of its part and operator, in the order of time.
+
+use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
+use tactus_lab::eval::gauge::{Reading, Study, distinct};
+
+/// Height of the chart without its words, px.
+const TALL: u32 = 320;
+
+/// The chart of one property, of which `readings` came to `study`; `unit` follows the name of the axis.
+///
+/// # Errors
+/// See [`DrawError`].
+pub fn figure(
+    id: &str,
+    title: &str,
+    unit: &str,
+    readings: &[Reading],
+    study: &Study,
+) -> Result<Figure, DrawError> {
+    let places = || (1..).map(f64::from).zip(study.away.iter().copied());
+    let operators = distinct(readings.iter().map(|r| r.operator.as_str()));
+    let end = readings.len() as f64 + 1.0;
+    let level = |name: &str, y: f64| Series::dashed(name, vec![(0.0, y), (end, y)]);
+    let limit = study.control_limit;
+    let mut series = vec![
+        level("limits", limit),
+        level("", -limit),
+        Series {
+            width: 1,
+            ..level("", 0.0)
+        },
+    ];
+    for (n, operator) in operators.iter().enumerate() {
+        let of = readings.iter().zip(places());
+        let of: Vec<_> = of.filter(|(r, _)| r.operator == *operator).collect();
+        let says = of.iter().map(|(r, (_, away))| {
+            let by = match r.operator.as_str() {
+                "" => String::new(),
+                name => format!(", {name}"),
+            };
+            format!("{}{by}, slide {}: {away:+.3}", r.part, r.slide)
+        });
+        let name = if operators.len() > 1 && operator.is_empty() {
+            "nobody named"
+        } else {
+            operator
+        };
+        series.push(Series {
+            says: says.collect(),
+            ..Series::points(
+                n,
+                MARKS[n % 3],
+                name,
+                of.iter().map(|(_, place)| *place).collect(),
+            )
+        });
+    }
+    if !study.outside.is_empty() {
+        let outside = places()
+            .zip(0..)
+            .filter(|(_, n)| study.outside.contains(n))
+            .map(|(place, _)| place);
+        series.push(Series {
+            colour: COLOURS[1],
+            ..Series::points(1, Mark::Cross, "outside the limits", outside.collect())
+        });
+    }
+    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed: three standard deviations, by \
+                 the mean moving range. A slide outside is worth a look at the sample, the finger and the rig.";
+    let y = format!("away from the mean{unit}");
+    Chart {
+        size: (WIDTH, TALL + Chart::height_of(below)),
+        below,
+        ..Chart::new(title, "slide, in the order of time", &y, (0.0, end), series)
+    }
+    .figure(id)
+}

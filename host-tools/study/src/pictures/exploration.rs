@@ -1,0 +1,171 @@
+//! What an exploration draws: how the posterior went, the spectrum beside its two best candidates, and one slide.
+
+use std::fmt::Display;
+
+use tactus_core::features::Observation;
+use tactus_core::probe::explore::ExplorationStep;
+use tactus_core::table::{Action, Table};
+use tactus_core::wire::Event;
+
+use crate::chart::{Chart, DrawError, Figure, MARKS, Series};
+use crate::pictures::spectrum::{self, Counted};
+
+/// Textures that were never more probable than this have no line of their own.
+const LIKELY: f32 = 0.05;
+/// Most lines.
+const MOST: usize = 6;
+
+/// The slides of an exploration that counted, as they come.
+#[derive(Clone, Debug)]
+pub struct Exploration<'t> {
+    table: Table<'t>,
+    slides: Vec<Counted>,
+}
+
+impl<'t> Exploration<'t> {
+    /// One with this table, of which nothing has happened yet.
+    pub fn new(table: Table<'t>) -> Self {
+        Self {
+            table,
+            slides: Vec::new(),
+        }
+    }
+
+    /// Its table.
+    pub fn table(&self) -> Table<'t> {
+        self.table
+    }
+
+    /// Takes a step of it.
+    pub fn step<E: Display>(&mut self, step: &ExplorationStep<'_, E>) {
+        if let ExplorationStep::Measured(action, measurement, posterior) = step {
+            self.slides.push(Counted {
+                action: *action,
+                observed: Observation::from(*measurement),
+                posterior: posterior.to_vec(),
+            });
+        }
+    }
+
+    /// Takes what a probe says of it; anything else is nothing of it.
+    pub fn event(&mut self, event: &Event) {
+        if let Event::SlideReport {
+            action,
+            observed,
+            posterior,
+            ..
+        } = event
+        {
+            self.slides.push(Counted {
+                action: *action,
+                observed: observed.observation(),
+                posterior: posterior.to_vec(),
+            });
+        }
+    }
+
+    /// Its pictures; none, if no slide counted.
+    ///
+    /// # Errors
+    /// See [`DrawError`].
+    pub fn figures(&self, threshold: f32) -> Result<Vec<Figure>, DrawError> {
+        if self.slides.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut figures = vec![self.posterior(threshold)?];
+        figures.extend(spectrum::figure(self.table, &self.slides, &self.best())?);
+        Ok(figures)
+    }
+
+    /// The textures, the most probable one at the end first, and how probable they are.
+    fn best(&self) -> Vec<(u16, f32)> {
+        let last = self.slides.last();
+        let posterior = last.map_or(&[][..], |slide| &slide.posterior);
+        let mut best: Vec<(u16, f32)> = (0..).zip(posterior.iter().copied()).collect();
+        best.sort_by(|a, b| b.1.total_cmp(&a.1));
+        best
+    }
+
+    fn posterior(&self, threshold: f32) -> Result<Figure, DrawError> {
+        let slides = self.slides.len() as f64;
+        let prior = 1.0 / f64::from(self.table.textures().max(1));
+        let of = |texture: u16| {
+            let after = self.slides.iter();
+            after.map(move |s| {
+                s.posterior
+                    .get(usize::from(texture))
+                    .copied()
+                    .unwrap_or(0.0)
+            })
+        };
+        let most = |texture: u16| of(texture).fold(0.0, f32::max);
+        let likely = self.best().into_iter().filter(|&(t, _)| most(t) >= LIKELY);
+        let shown: Vec<u16> = likely.map(|(texture, _)| texture).take(MOST).collect();
+        let mut series = Vec::new();
+        for (n, &texture) in shown.iter().enumerate() {
+            let name = self.table.name(texture).unwrap_or("?");
+            let after = of(texture).map(|p| 100.0 * f64::from(p));
+            let after: Vec<f64> = std::iter::once(100.0 * prior).chain(after).collect();
+            let says = (0..).zip(&after).map(|(slide, p)| match slide {
+                0 => format!("{name}: {p:.2} % before the first slide"),
+                n => format!("{name}: {p:.2} % after slide {n}"),
+            });
+            let says = says.collect();
+            let points = (0..).map(f64::from).zip(after).collect();
+            series.push(Series {
+                says,
+                ..Series::curve(n, MARKS[n % MARKS.len()], name, points)
+            });
+        }
+        let limit = 100.0 * f64::from(threshold);
+        let ends = vec![(0.0, limit), (slides, limit)];
+        series.push(Series::dashed("threshold", ends));
+        let step = |x: f64| {
+            let at = x.round() as usize;
+            if at == 0 {
+                return "start".to_owned();
+            }
+            let slide = self.slides.get(at - 1);
+            match slide.map(|slide| slide.action) {
+                Some(Action {
+                    movement,
+                    property: Some(property),
+                }) => {
+                    format!("M{} {}", movement + 1, property.name()[..1].to_uppercase())
+                }
+                Some(Action {
+                    movement,
+                    property: None,
+                }) => format!("M{}", movement + 1),
+                None => String::new(),
+            }
+        };
+        let properties = self.slides.iter().any(|s| s.action.property.is_some());
+        let mut made: Vec<u8> = self.slides.iter().map(|s| s.action.movement).collect();
+        made.sort_unstable();
+        made.dedup();
+        let made = made
+            .iter()
+            .filter_map(|&m| Some(format!("M{}: {}", m + 1, self.table.movement(m)?)));
+        let mut below = made.collect::<Vec<_>>().join("; ");
+        below.push('.');
+        if properties {
+            below += " Looked at: T traction, R roughness, F fineness.";
+        }
+        Chart {
+            y_range: (0.0, 104.0),
+            x_marks: self.slides.len() + 1,
+            x_text: &step,
+            below: &below,
+            size: (crate::chart::WIDTH, 400),
+            ..Chart::new(
+                "How probable each texture was",
+                "slide",
+                "posterior probability (%)",
+                (-0.1, slides + 0.1),
+                series,
+            )
+        }
+        .figure("posterior")
+    }
+}

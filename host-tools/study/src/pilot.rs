@@ -1,0 +1,182 @@
+//! The pilot study: which of 36 movements tells ten textures best apart by which property (figs. 5, 6, 7).
+
+use serde::{Deserialize, Serialize};
+use tactus_core::explorer::{Config, Explorer, Method};
+use tactus_core::features::{Movement, Property, PropertySet};
+use tactus_core::table::Table;
+
+use super::error::StudyError;
+use super::published::{MOST_USEFUL, PILOT_TEXTURES, PILOT_TRIALS};
+use super::slides::{Named, Session, StudyWorld, TextureTrials, properties};
+use tactus_lab::eval::evaluate::EvaluateError;
+use tactus_lab::eval::learn::learn;
+use tactus_lab::sim::collection::texture_name;
+
+/// Number of the pilot's session: see [`Session::number`].
+const SESSION: u64 = 3;
+
+/// What the pilot study found.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Pilot {
+    /// The textures.
+    pub textures: Vec<Named>,
+    /// The 36 movements, force by force.
+    pub movements: Vec<PilotMovement>,
+    /// For each property, the movement of the least uncertainty among those that do not wear the skin.
+    pub most_useful: Vec<MostUseful>,
+    /// Traction, roughness and fineness by texture, movement and trial.
+    pub properties: Vec<Vec<Vec<[f32; 3]>>>,
+}
+
+/// One of the 36 movements.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct PilotMovement {
+    /// Contact force, N.
+    pub force_n: f32,
+    /// Sliding speed, mm/s.
+    pub speed_mm_s: f32,
+    /// Sliding power with a coefficient of friction of 1, mW (eq. 22).
+    pub power_mw: f32,
+    /// Whether it is avoided for its wear.
+    pub high_wear: bool,
+    /// How much of the ridges 100 slides took, mean over the textures, %.
+    pub wear: f64,
+    /// Uncertainty that one slide leaves among the textures, by property (eq. 11); 1, which is all, for a movement that was
+    /// not reached on every texture.
+    pub uncertainty: [f32; 3],
+    /// Where the rig could not make it.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub not_reached: Vec<Missed>,
+}
+
+/// A texture on which the rig could not make a movement.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Missed {
+    /// Number of the texture.
+    pub texture: u8,
+    /// Number of the trial that failed, from 1.
+    pub trial: u32,
+    /// Why.
+    pub reason: String,
+}
+
+/// The best movement for a property.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct MostUseful {
+    /// The property.
+    pub property: Property,
+    /// Place of the movement in [`Pilot::movements`].
+    pub movement: usize,
+    /// The same for the one that the paper found.
+    pub paper: usize,
+    /// What is left by the best of all, those that wear the skin among them.
+    pub with_wear: usize,
+}
+
+impl Pilot {
+    /// Textures of [`Pilot::run`], for a progress bar.
+    pub const TEXTURES: u64 = PILOT_TEXTURES.len() as u64;
+
+    /// Makes the slides of the pilot study, and looks for the most useful movements.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn run(world: StudyWorld, done: impl Fn() + Sync) -> Result<Self, StudyError> {
+        let movements: Vec<Movement> = Movement::grid().collect();
+        let session = Session {
+            textures: &PILOT_TEXTURES,
+            movements: &movements,
+            trials: PILOT_TRIALS,
+            number: SESSION,
+            force_guard: false,
+            may_miss: true,
+        };
+        let trials = world.record(&session, world.calibration()?, done)?;
+        Self::of(&movements, &trials)
+    }
+
+    /// What the trials say.
+    ///
+    /// # Errors
+    /// See [`StudyError`].
+    pub fn of(movements: &[Movement], trials: &[TextureTrials]) -> Result<Self, StudyError> {
+        let missed = |movement: usize| {
+            let of = |t: &TextureTrials| {
+                let missed = t.not_reached.iter().find(|m| m.movement == movement)?;
+                Some(Missed {
+                    texture: t.texture,
+                    trial: missed.trial,
+                    reason: missed.why.to_string(),
+                })
+            };
+            trials.iter().filter_map(of).collect::<Vec<_>>()
+        };
+        let reached: Vec<usize> = (0..movements.len())
+            .filter(|&movement| missed(movement).is_empty())
+            .collect();
+        let uncertainty = uncertainty(movements, &reached, trials)?;
+        let slides = trials.iter().flat_map(|t| t.slides.first()).map(Vec::len);
+        let slides = slides.sum::<usize>().max(1) as f64;
+        let rows = movements.iter().zip(&uncertainty).enumerate();
+        let rows = rows.map(|(m, (movement, uncertainty))| {
+            let grown = trials.iter().map(|t| t.wear[m + 1] - t.wear[m]);
+            PilotMovement {
+                force_n: movement.force_n(),
+                speed_mm_s: movement.speed_mm_s(),
+                power_mw: movement.power_mw(),
+                high_wear: movement.is_high_wear(),
+                wear: 1e4 * grown.sum::<f64>() / slides,
+                uncertainty: *uncertainty,
+                not_reached: missed(m),
+            }
+        });
+        let best = |property: Property, may: fn(&Movement) -> bool| {
+            let all = movements.iter().zip(&uncertainty).enumerate();
+            all.filter(|(_, (movement, _))| may(movement))
+                .min_by(|a, b| {
+                    let [a, b] = [a, b].map(|(_, (_, u))| u[property.index()]);
+                    a.total_cmp(&b)
+                })
+                .map_or(0, |(at, _)| at)
+        };
+        let most_useful = MOST_USEFUL.map(|(paper, property)| MostUseful {
+            property,
+            movement: best(property, |m| !m.is_high_wear()),
+            paper: movements.iter().position(|m| *m == paper).unwrap_or(0),
+            with_wear: best(property, |_| true),
+        });
+        Ok(Self {
+            textures: trials.iter().map(|t| Named::new(t.texture)).collect(),
+            movements: rows.collect(),
+            most_useful: most_useful.to_vec(),
+            properties: trials.iter().map(|t| properties(&t.slides)).collect(),
+        })
+    }
+}
+
+/// Uncertainty of every movement and property when all textures are equally probable, by the core's explorer; 1 for
+/// movements that were not `reached`.
+fn uncertainty(
+    movements: &[Movement],
+    reached: &[usize],
+    trials: &[TextureTrials],
+) -> Result<Vec<[f32; 3]>, StudyError> {
+    let names = trials.iter().map(|t| texture_name(t.texture).to_owned());
+    let slides = |t: &TextureTrials| reached.iter().map(|&m| t.slides[m].clone()).collect();
+    let slides: Vec<Vec<_>> = trials.iter().map(slides).collect();
+    let names: Vec<String> = names.collect();
+    let made: Vec<Movement> = reached.iter().map(|&m| movements[m]).collect();
+    let bytes = learn(Method::Paper, None, &names, &made, &slides)?;
+    let table = Table::read(&bytes).map_err(EvaluateError::from)?;
+    let explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())
+        .map_err(EvaluateError::from)?;
+    let mut left = vec![[1.0; 3]; movements.len()];
+    for outcome in explorer.expected_outcomes() {
+        let movement = reached.get(usize::from(outcome.action.movement));
+        let of_movement = movement.and_then(|&movement| left.get_mut(movement));
+        if let (Some(left), Some(property)) = (of_movement, outcome.action.property) {
+            left[property.index()] = outcome.uncertainty;
+        }
+    }
+    Ok(left)
+}

@@ -1,0 +1,44 @@
+//! What breaks in the world, when, and how it is repaired.
+
+use super::World;
+use crate::faults::{Fault, Faults};
+use crate::parts::PartFault;
+
+impl World {
+    /// Breaks something now, or presses the stop. Faults add up.
+    pub fn inject(&mut self, fault: Fault) {
+        let position_mm = self.stage.position_at_mm(self.fraction());
+        self.inject_at(fault, self.now_ns, position_mm);
+    }
+
+    /// Breaks something of the finger's parts; a BioTac has none.
+    pub fn break_part(&mut self, fault: PartFault) {
+        self.peers.break_part(self.now_ns, fault, &mut self.finger);
+    }
+
+    /// Lets something break at a time, to the tick: up to 76 us late.
+    pub fn schedule(&mut self, at_ns: u64, fault: Fault) {
+        self.scheduled.push((at_ns, fault));
+        self.scheduled
+            .sort_by_key(|(at_ns, _)| std::cmp::Reverse(*at_ns));
+    }
+
+    /// Repairs everything, and forgets what was scheduled; a sensor that is plugged in again starts up. What a fault has
+    /// done stays: lost steps, lost counts, a lever that ran down.
+    pub fn clear(&mut self) {
+        self.faults = Faults::default();
+        self.scheduled.clear();
+        self.peers.mend(self.now_ns);
+        self.finger.mend();
+        self.stage.jam(false);
+        self.stage.decay_fast(false);
+        self.stage.vibrate(0.0);
+        let position_mm = self.stage.position_at_mm(self.fraction());
+        self.encoder.set_cut(None, position_mm, self.now_ns);
+        self.encoder.swap(false, position_mm, self.now_ns);
+        self.lever.lose_steps(0.0);
+        self.lever.run_away_down(false);
+        self.lever.invert_dir(false);
+        self.supply_motors();
+    }
+}

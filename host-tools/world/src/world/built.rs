@@ -1,0 +1,82 @@
+//! What was wrong in a world from the beginning, and what a person does to it before anything moves.
+
+use super::World;
+use crate::faults::Stop;
+use crate::parts::Peers;
+use crate::wiring::Miswired;
+
+impl World {
+    /// Somebody has built it like this. To be called before time passes; mistakes add up.
+    pub fn miswire(&mut self, mistake: Miswired) {
+        self.wires.take(mistake);
+        let position_mm = self.stage.position_mm();
+        match mistake {
+            Miswired::LeverCoilOpen => self.lever.open_coil(),
+            Miswired::LeverMicrosteps(per_pulse) => self.lever.set_microsteps(per_pulse),
+            Miswired::EncoderLines(share) => self.encoder.set_lines(share, position_mm),
+            _ => {}
+        }
+    }
+
+    /// What drives the sensor's wires at the chip's MISO and MOSI while it is selected and has no clock.
+    pub fn data_lines(&self) -> [Option<bool>; 2] {
+        let plugged = match &self.peers {
+            Peers::BioTac(sensor) => sensor.is_plugged(),
+            _ => true,
+        };
+        let selected = plugged && !self.wires.select_open;
+        // an idle sensor holds its output low (chosen)
+        let sensor = selected.then_some(false);
+        match self.wires.data_exchanged {
+            true => [self.faults.miso_stuck, sensor],
+            false => [self.faults.miso_stuck.or(sensor), None],
+        }
+    }
+
+    /// Lines A and B of the encoder at the chip, each if something drives it.
+    pub fn encoder_levels(&self, (a, b): (bool, bool)) -> [Option<bool>; 2] {
+        let (a_wired, b_wired) = self.encoder.is_wired();
+        [a_wired.then_some(a), b_wired.then_some(b)]
+    }
+
+    /// Somebody pushes the stage by hand to a place, mm from its lower hard stop.
+    pub fn push_stage(&mut self, to_mm: f64) {
+        self.stage.push(to_mm);
+    }
+
+    /// Somebody puts a resistor of so many ohm in the place of the stage's motor, or the motor back.
+    pub fn replace_motor(&mut self, ohm: Option<f64>) {
+        self.stage.replace_motor(ohm);
+    }
+
+    /// Somebody turns the emergency stop back.
+    pub fn release_stop(&mut self) {
+        self.faults.e_stop = Stop::default();
+        self.supply_motors();
+    }
+
+    /// Whether the motors' drivers have their supply.
+    pub fn has_motor_supply(&self) -> bool {
+        !self.faults.e_stop.cuts_power() || self.wires.stop_keeps_supply
+    }
+
+    /// Somebody holds a limit switch of the stage, or the lever's, actuated with a finger, or lets it go.
+    pub fn hold_switch(&mut self, switch: Reached, held: bool) {
+        match switch {
+            Reached::Lower => self.stage.hold_limits(held, false),
+            Reached::Upper => self.stage.hold_limits(false, held),
+            Reached::Top => self.lever.hold_switch(held),
+        }
+    }
+}
+
+/// A switch that somebody can reach.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reached {
+    /// The stage's, at its lower end.
+    Lower,
+    /// At its upper end.
+    Upper,
+    /// The lever's.
+    Top,
+}

@@ -1,0 +1,51 @@
+//! What holds the finger where lever and stage do not: a hand, or an arm.
+
+use crate::arm::Arm;
+use crate::finger::Held;
+use crate::person::Hand;
+
+pub(super) enum Holder {
+    Hand(Box<Hand>),
+    Arm(Box<Arm>),
+}
+
+impl Holder {
+    /// A tick against this force on the finger, N.
+    pub(super) fn tick(&mut self, force_n: f64) {
+        match self {
+            Self::Hand(hand) => hand.tick(force_n),
+            Self::Arm(arm) => arm.tick(),
+        }
+    }
+
+    pub(super) fn held(&self) -> Held {
+        match self {
+            Self::Hand(hand) => hand.held(),
+            Self::Arm(_) => Held::STILL,
+        }
+    }
+
+    /// How deep the sample is in the fingertip, mm; negative is a gap.
+    pub(super) fn indentation_mm(&self) -> f64 {
+        match self {
+            Self::Hand(hand) => hand.indentation_mm(),
+            Self::Arm(arm) => arm.indentation_mm(),
+        }
+    }
+
+    /// Place of the finger on the sample, mm from its edge.
+    pub(super) fn x_mm(&self) -> f64 {
+        match self {
+            Self::Hand(hand) => hand.x_mm(),
+            Self::Arm(arm) => arm.x_mm(),
+        }
+    }
+
+    /// Its speed along the sample, mm/s.
+    pub(super) fn speed_mm_s(&self) -> f64 {
+        match self {
+            Self::Hand(hand) => hand.speed_mm_s(),
+            Self::Arm(arm) => arm.speed_mm_s(),
+        }
+    }
+}

@@ -1,0 +1,553 @@
+//! `tactus convert`: what others' readers find in the files is what recordings and log hold.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{Cursor, Read as _};
+use std::path::Path;
+use std::process::{Command, Output};
+
+use flate2::read::GzDecoder;
+use mcap::MessageStream;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use serde_json::{Value, json};
+use tactus_core::features::{FUSED_BANDS, Property};
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::replay::measure_all;
+
+const RECORDINGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
+
+fn tactus(arguments: &[&str]) -> Output {
+    let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    tactus.args(arguments).output().unwrap()
+}
+
+fn convert(from: &Path, kind: &str, to: &Path) {
+    let out = tactus(&["convert", text(from), kind, text(to), "--format", "json"]);
+    assert!(out.status.success(), "{out:?}");
+    let written: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(written[0]["bytes"], fs::metadata(to).unwrap().len());
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Time and content of all messages of a file, by channel; each channel's schema names each field.
+fn messages(file: &Path) -> BTreeMap<String, Vec<(u64, Value)>> {
+    let bytes = fs::read(file).unwrap();
+    let mut found: BTreeMap<String, Vec<(u64, Value)>> = BTreeMap::new();
+    for message in MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let channel = &message.channel;
+        let content: Value = serde_json::from_slice(&message.data).unwrap();
+        let schema = channel.schema.as_ref().unwrap();
+        let schema: Value = serde_json::from_slice(&schema.data).unwrap();
+        for name in content.as_object().unwrap().keys() {
+            let known = schema["properties"].get(name).is_some();
+            // a verdict has more than its schema promises
+            assert!(
+                known || channel.topic == "/verdict",
+                "{}: {name}",
+                channel.topic
+            );
+        }
+        let all = found.entry(channel.topic.clone()).or_default();
+        all.push((message.log_time, content));
+    }
+    found
+}
+
+fn counts(messages: &[(u64, Value)], field: &str) -> Vec<i16> {
+    let numbers = messages.iter().map(|(_, content)| content[field].as_i64());
+    numbers.map(|number| number.unwrap() as i16).collect()
+}
+
+/// A session's log, unpacked.
+fn session(folder: &Path) -> (std::path::PathBuf, Vec<Value>) {
+    let packed = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/golden/identify.jsonl.gz"
+    );
+    let mut lines = String::new();
+    let mut packed = GzDecoder::new(fs::File::open(packed).unwrap());
+    packed.read_to_string(&mut lines).unwrap();
+    let log = folder.join("session.jsonl");
+    fs::write(&log, &lines).unwrap();
+    let lines = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap());
+    (log, lines.collect())
+}
+
+#[test]
+fn an_mcap_of_recordings_holds_every_sample_and_feature() {
+    let temp = tempfile::tempdir().unwrap();
+    let file = temp.path().join("recordings.mcap");
+    convert(Path::new(RECORDINGS), "--mcap", &file);
+    let found = messages(&file);
+    let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
+    let [mut pac, mut pdc, mut shear] = [const { Vec::new() }; 3];
+    let mut slides = 0;
+    for index in 0..set.textures().len() {
+        for slide in set.load_texture(index).unwrap() {
+            pac.extend(slide.still());
+            pac.extend(slide.pac());
+            pdc.extend(slide.pdc.clone());
+            shear.extend(slide.shear_mn().unwrap());
+            slides += 1;
+        }
+    }
+    assert_eq!(counts(&found["/pac"], "counts"), pac);
+    assert_eq!(counts(&found["/pdc"], "counts"), pdc);
+    assert_eq!(counts(&found["/shear"], "mn"), shear);
+    assert_eq!(found["/movement"].len(), slides);
+    // P_AC and P_DC begin with the movement, and each sample is 1/2200 s after the one before
+    let (begin, _) = found["/movement"][0];
+    assert_eq!(found["/pdc"][0].0, begin);
+    let still = set.load_texture(0).unwrap()[0].still().len();
+    assert_eq!(found["/pac"][still].0, begin);
+    assert_eq!(found["/pac"][still + 2200].0, begin + 1_000_000_000);
+    let measured = measure_all(&set, |_| ()).unwrap().concat();
+    assert_eq!(found["/features"].len(), measured.len());
+    for (slide, (_, told)) in measured.iter().zip(&found["/features"]) {
+        let [traction, roughness, fineness] =
+            Property::ALL.map(|p| slide.measurement.properties.get(p));
+        for (value, name) in [
+            (traction, "traction_n"),
+            (roughness, "roughness"),
+            (fineness, "fineness"),
+        ] {
+            assert_eq!(told[name].as_f64().map(|x| x as f32), value, "{name}");
+        }
+    }
+    read_by_python(&file, found.values().map(Vec::len).sum());
+}
+
+#[test]
+fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
+    let temp = tempfile::tempdir().unwrap();
+    let (log, lines) = session(temp.path());
+    let file = temp.path().join("session.mcap");
+    convert(&log, "--mcap", &file);
+    let found = messages(&file);
+    let events: Vec<(u64, &Value)> = lines
+        .iter()
+        .filter_map(|line| {
+            Some((
+                line.get("report")?["at_ms"].as_u64()?,
+                &line["report"]["tell"],
+            ))
+        })
+        .collect();
+    let of = |kind: &str| -> Vec<(u64, &Value)> {
+        let of_kind = events
+            .iter()
+            .filter_map(|(at, e)| Some((*at, e.get(kind)?)));
+        of_kind.collect()
+    };
+    let live = of("Live");
+    assert!(live.len() > 100);
+    assert_eq!(found["/rig"].len(), live.len());
+    for ((at, told), (at_ns, rig)) in live.iter().zip(&found["/rig"]) {
+        assert_eq!(*at_ns, at * 1_000_000);
+        assert_eq!(rig["force_mn"], told["force_mn"]);
+        assert_eq!(rig["stage_mm"], told["stage_um"].as_f64().unwrap() * 1e-3);
+    }
+    let sent: Vec<Value> = of("Block")
+        .iter()
+        .flat_map(|(_, block)| block["pac"].as_array().unwrap().clone())
+        .collect();
+    let pac: Vec<Value> = found["/pac"]
+        .iter()
+        .map(|(_, m)| m["counts"].clone())
+        .collect();
+    assert_eq!(pac, sent);
+    // gap-free, but for where the still finger's samples end
+    let steps = found["/pac"].windows(2).map(|pair| pair[1].0 - pair[0].0);
+    let gaps = steps.filter(|step| !(454_000..=455_000).contains(step));
+    assert!(gaps.count() <= 1);
+    let [(at, verdict)] = of("Verdict")[..] else {
+        panic!()
+    };
+    assert_eq!(found["/verdict"][0].0, at * 1_000_000);
+    assert_eq!(found["/verdict"][0].1["name"], verdict["name"]);
+    // the table was read in this session: textures have their names
+    let (_, last) = found["/posterior"].last().unwrap();
+    assert_eq!(last["most_likely"], verdict["name"]);
+    assert_eq!(
+        last["all"][verdict["name"].as_str().unwrap()],
+        last["probability"]
+    );
+    let asked = lines.iter().filter(|line| line.get("ask").is_some());
+    assert_eq!(found["/request"].len(), asked.count());
+}
+
+#[test]
+fn an_npz_holds_every_stream_and_a_row_for_each_slide() {
+    let temp = tempfile::tempdir().unwrap();
+    let file = temp.path().join("recordings.npz");
+    convert(Path::new(RECORDINGS), "--npz", &file);
+    let bytes = fs::read(&file).unwrap();
+    let mut npz = zip::ZipArchive::new(Cursor::new(&bytes)).unwrap();
+    let mut array = |name: String| {
+        let mut bytes = Vec::new();
+        npz.by_name(&format!("{name}.npy"))
+            .unwrap()
+            .read_to_end(&mut bytes)
+            .unwrap();
+        bytes
+    };
+    let npy = |bytes: &[u8]| npyz::NpyFile::new(Cursor::new(bytes.to_vec())).unwrap();
+    let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
+    let measured = measure_all(&set, |_| ()).unwrap();
+    let mut row = 0;
+    let properties = array("properties".to_owned());
+    let properties: Vec<f32> = npy(&properties).into_vec().unwrap();
+    for (index, measured) in measured.iter().enumerate() {
+        for (slide, measured) in set.load_texture(index).unwrap().iter().zip(measured) {
+            for (stream, samples) in [
+                ("still", slide.still()),
+                ("pac", slide.pac()),
+                ("pdc", slide.pdc.clone()),
+                ("shear", slide.shear_mn().unwrap()),
+            ] {
+                let there: Vec<i16> = npy(&array(format!("{stream}_{row}"))).into_vec().unwrap();
+                assert_eq!(there, samples);
+            }
+            let told = Property::ALL.map(|p| measured.measurement.properties.get(p).unwrap());
+            assert_eq!(properties[3 * row..][..3], told);
+            row += 1;
+        }
+    }
+    assert_eq!(properties.len(), 3 * row);
+    assert_eq!(npy(&array("movement".to_owned())).shape(), [row as u64, 2]);
+    assert_eq!(npy(&array("texture".to_owned())).shape(), [row as u64]);
+    let again = temp.path().join("again.npz");
+    convert(Path::new(RECORDINGS), "--npz", &again);
+    assert_eq!(fs::read(again).unwrap(), bytes);
+    let names: Vec<&str> = set.textures().iter().map(|t| t.name.as_str()).collect();
+    python(
+        "import sys, numpy
+a = numpy.load(sys.argv[1])
+assert sorted(set(a['texture'])) == sorted(sys.argv[2].split('|')), a['texture']
+assert a['pac_0'].dtype == numpy.int16 and len(a['pac_0']) > 2200
+assert a['properties'].shape == (len(a['texture']), 3)
+assert numpy.isfinite(a['ln_bands']).all()",
+        &[text(&file), &names.join("|")],
+        "numpy",
+    );
+}
+
+/// The rows of a Parquet file as JSON, and what is said of all of them.
+fn rows(file: &Path) -> (Vec<Value>, BTreeMap<String, String>) {
+    let reader = SerializedFileReader::new(fs::File::open(file).unwrap()).unwrap();
+    let said = reader.metadata().file_metadata().key_value_metadata();
+    let said = said.unwrap().iter().cloned();
+    let said = said.map(|of| (of.key, of.value.unwrap())).collect();
+    let rows = reader.get_row_iter(None).unwrap();
+    (rows.map(|row| row.unwrap().to_json_value()).collect(), said)
+}
+
+/// What Arrow's reader makes of it: the same rows, and the units of their numbers.
+const PYARROW: &str = "import sys, json, pyarrow.parquet
+t = pyarrow.parquet.read_table(sys.argv[1])
+wanted = json.loads(sys.argv[2])
+units = json.loads(t.schema.metadata[b'units'])
+assert units['force_n'] == 'N' and set(units) <= set(t.column_names), units
+found = []
+for row in t.to_pylist():
+    found.append([row['texture'], row['slide'], row['roughness'], len(row['ln_bands']), sum(p for _, p in row['posterior'])])
+assert len(found) == len(wanted), (len(found), len(wanted))
+for f, w in zip(found, wanted):
+    assert f[:2] == w[:2] and f[3] == w[3], (f, w)
+    assert abs(f[2] - w[2]) < 1e-6 and abs(f[4] - w[4]) < 1e-6, (f, w)";
+
+/// What of each row [`PYARROW`] compares.
+fn read_by_pyarrow(file: &Path, rows: &[Value]) {
+    let compared = rows.iter().map(|row| {
+        let posterior = row["posterior"].as_object().unwrap().values();
+        let sum: f64 = posterior.map(|p| p.as_f64().unwrap()).sum();
+        let bands = row["ln_bands"].as_array().unwrap().len();
+        json!([row["texture"], row["slide"], row["roughness"], bands, sum])
+    });
+    let compared = Value::from_iter(compared).to_string();
+    python(PYARROW, &[text(file), &compared], "pyarrow");
+}
+
+#[test]
+fn a_parquet_of_recordings_holds_features_and_what_a_table_makes_of_them() {
+    let temp = tempfile::tempdir().unwrap();
+    let [table, file] = ["table", "slides.parquet"].map(|name| temp.path().join(name));
+    let learned = tactus(&[
+        "learn",
+        "--recordings",
+        RECORDINGS,
+        "--train-slides",
+        "2",
+        "--out",
+        text(&table),
+    ]);
+    assert!(learned.status.success(), "{learned:?}");
+    let written = tactus(&[
+        "convert",
+        RECORDINGS,
+        "--parquet",
+        text(&file),
+        "--table",
+        text(&table),
+    ]);
+    assert!(written.status.success(), "{written:?}");
+    let (rows, said) = rows(&file);
+    let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
+    let measured = measure_all(&set, |_| ()).unwrap();
+    let names = set.names();
+    let slides = measured.iter().zip(&names);
+    let slides = slides.flat_map(|(slides, name)| slides.iter().map(move |slide| (name, slide)));
+    assert_eq!(rows.len(), slides.clone().count());
+    let mut right = 0;
+    for ((name, slide), row) in slides.zip(&rows) {
+        assert_eq!(row["texture"], **name);
+        assert_eq!(row["slide"], slide.number);
+        assert_eq!(row["exploration"], Value::Null);
+        let number = |name: &str| row[name].as_f64().map(|x| x as f32);
+        assert_eq!(number("force_n"), Some(slide.movement.force_n()));
+        assert_eq!(number("speed_mm_s"), Some(slide.movement.speed_mm_s()));
+        let of = |property| slide.measurement.properties.get(property);
+        assert_eq!(number("traction_n"), of(Property::Traction));
+        assert_eq!(number("roughness"), of(Property::Roughness));
+        assert_eq!(number("fineness"), of(Property::Fineness));
+        let bands = row["ln_bands"].as_array().unwrap();
+        assert_eq!(bands.len(), FUSED_BANDS);
+        for (told, band) in bands.iter().zip(slide.measurement.fused_bands()) {
+            // in steps of 1/1024
+            assert!((told.as_f64().unwrap() - f64::from(band)).abs() < 5e-4);
+        }
+        let (mean, _) = slide.measurement.pdc.unwrap();
+        assert!((number("pdc_mean").unwrap() - mean).abs() < 0.05);
+        let posterior = row["posterior"].as_object().unwrap();
+        let sum: f64 = posterior.values().map(|p| p.as_f64().unwrap()).sum();
+        assert!((sum - 1.0).abs() < 1e-4, "{sum}");
+        let likely = row["most_likely"].as_str().unwrap();
+        assert_eq!(posterior[likely], row["probability"]);
+        right += usize::from(likely == name);
+    }
+    // most of them were learned from
+    assert!(5 * right > 4 * rows.len(), "{right} of {}", rows.len());
+    assert_eq!(said["finger"], "biotac");
+    let about: Value = serde_json::from_str(&said["table"]).unwrap();
+    assert_eq!(about["textures"], names.len());
+    read_by_pyarrow(&file, &rows);
+    // the same from a pipe
+    let piped = tactus(&[
+        "convert",
+        RECORDINGS,
+        "--parquet",
+        "-",
+        "--table",
+        text(&table),
+    ]);
+    assert!(piped.status.success() && piped.stdout == fs::read(&file).unwrap());
+}
+
+#[test]
+fn a_parquet_of_a_log_holds_what_the_probe_said_of_each_slide() {
+    let temp = tempfile::tempdir().unwrap();
+    let (log, lines) = session(temp.path());
+    let file = temp.path().join("session.parquet");
+    convert(&log, "--parquet", &file);
+    let (rows, said) = rows(&file);
+    let reports = lines.iter().map(|line| &line["report"]);
+    let slides: Vec<(&Value, &Value)> = reports
+        .filter_map(|report| Some((report, report["tell"].get("Felt")?)))
+        .collect();
+    assert_eq!(rows.len(), slides.len());
+    for (row, (report, told)) in rows.iter().zip(slides) {
+        assert_eq!(row["exploration"], 1);
+        assert_eq!(row["slide"], told["slide"]);
+        let at_ms = row["time_s"].as_f64().unwrap() * 1e3;
+        assert!((at_ms - report["at_ms"].as_f64().unwrap()).abs() < 1e-6);
+        let told_of = &told["felt"]["properties"];
+        for (at, name) in ["traction_n", "roughness", "fineness"]
+            .into_iter()
+            .enumerate()
+        {
+            let told = told_of[at].as_f64().map(|x| x as f32);
+            assert_eq!(row[name].as_f64().map(|x| x as f32), told, "{name}");
+        }
+        assert!(row["force_n"].as_f64().unwrap() > 0.0);
+    }
+    let verdict = lines
+        .iter()
+        .find_map(|line| line["report"]["tell"].get("Verdict"));
+    assert_eq!(
+        rows.last().unwrap()["most_likely"],
+        verdict.unwrap()["name"]
+    );
+    assert!(said["from"].ends_with("session.jsonl") && said.contains_key("table"));
+    read_by_pyarrow(&file, &rows);
+}
+
+#[test]
+fn files_go_through_pipes() {
+    let temp = tempfile::tempdir().unwrap();
+    let (log, _) = session(temp.path());
+    let file = temp.path().join("session.mcap");
+    convert(&log, "--mcap", &file);
+    let piped = Command::new(env!("CARGO_BIN_EXE_tactus"))
+        .args(["convert", "-", "--mcap", "-"])
+        .stdin(fs::File::open(&log).unwrap())
+        .output()
+        .unwrap();
+    assert!(piped.status.success(), "{piped:?}");
+    // but for the name of where it is from, the same file
+    let of = |bytes: &[u8]| {
+        let messages = MessageStream::new(bytes).unwrap().map(Result::unwrap);
+        messages
+            .map(|m| (m.log_time, m.data.to_vec()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(of(&piped.stdout), of(&fs::read(&file).unwrap()));
+    let npz = temp.path().join("recordings.npz");
+    convert(Path::new(RECORDINGS), "--npz", &npz);
+    let piped = tactus(&["convert", RECORDINGS, "--npz", "-"]);
+    assert!(piped.stdout == fs::read(&npz).unwrap());
+    let two = tactus(&["convert", RECORDINGS, "--npz", "-", "--mcap", "-"]);
+    assert_eq!(two.status.code(), Some(2));
+    assert!(two.stdout.is_empty());
+}
+
+#[test]
+fn what_cannot_be_converted_is_told() {
+    let temp = tempfile::tempdir().unwrap();
+    let (log, _) = session(temp.path());
+    let to = temp.path().join("there");
+    let of_a_log = tactus(&["convert", text(&log), "--npz", text(&to)]);
+    assert_eq!(of_a_log.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&of_a_log.stderr).contains("--mcap"));
+    let table = tactus(&[
+        "convert",
+        text(&log),
+        "--parquet",
+        text(&to),
+        "--table",
+        "t",
+    ]);
+    assert_eq!(table.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&table.stderr).contains("recordings"));
+    assert!(!to.exists());
+    fs::write(&to, "mine").unwrap();
+    let over = tactus(&["convert", RECORDINGS, "--mcap", text(&to)]);
+    assert_eq!(over.status.code(), Some(1));
+    assert_eq!(fs::read(&to).unwrap(), b"mine");
+    let nothing = tactus(&["convert", RECORDINGS]);
+    assert_eq!(nothing.status.code(), Some(2));
+}
+
+#[test]
+fn a_picture_shows_the_panels_of_the_layout() {
+    let temp = tempfile::tempdir().unwrap();
+    let (log, _) = session(temp.path());
+    let [file, picture] = ["session.mcap", "channels.svg"].map(|name| temp.path().join(name));
+    let drawn = tactus(&[
+        "convert",
+        text(&log),
+        "--mcap",
+        text(&file),
+        "--plot",
+        text(&picture),
+    ]);
+    assert!(drawn.status.success(), "{drawn:?}");
+    let svg = fs::read_to_string(&picture).unwrap();
+    let layout = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/plotjuggler.xml");
+    let layout = fs::read_to_string(layout).unwrap();
+    let layout = roxmltree::Document::parse(&layout).unwrap();
+    let nodes = layout.descendants();
+    let curves = nodes.filter(|node| node.has_tag_name("curve"));
+    let curves: Vec<&str> = curves.map(|node| node.attribute("name").unwrap()).collect();
+    assert_eq!(curves.len(), 6);
+    for curve in curves {
+        assert!(svg.contains(curve), "{curve}");
+    }
+    // the file is the one without a picture
+    let plain = temp.path().join("plain.mcap");
+    convert(&log, "--mcap", &plain);
+    assert!(fs::read(plain).unwrap() == fs::read(&file).unwrap());
+    let nothing = tactus(&["convert", text(&log), "--parquet", "x", "--plot", "y.svg"]);
+    assert_eq!(nothing.status.code(), Some(2));
+}
+
+#[test]
+fn layouts_show_channels_that_there_are() {
+    let temp = tempfile::tempdir().unwrap();
+    let (log, _) = session(temp.path());
+    let file = temp.path().join("session.mcap");
+    convert(&log, "--mcap", &file);
+    let bytes = fs::read(&file).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let mut fields = Vec::new();
+    for channel in summary.channels.values() {
+        let schema = channel.schema.as_ref().unwrap();
+        let schema: Value = serde_json::from_slice(&schema.data).unwrap();
+        fields.push(channel.topic.clone());
+        let names = schema["properties"].as_object().unwrap().keys();
+        fields.extend(names.map(|name| format!("{}/{name}", channel.topic)));
+    }
+    let docs = |name| format!("{}/../../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    let page = fs::read_to_string(docs("src/convert.md")).unwrap();
+    for channel in summary.channels.values() {
+        assert!(page.contains(&format!("| `{}` |", channel.topic)));
+    }
+    let foxglove = fs::read_to_string(docs("foxglove.json")).unwrap();
+    serde_json::from_str::<Value>(&foxglove).unwrap();
+    let plotjuggler = fs::read_to_string(docs("plotjuggler.xml")).unwrap();
+    roxmltree::Document::parse(&plotjuggler).unwrap();
+    for layout in [foxglove, plotjuggler] {
+        let shown: Vec<String> = layout
+            .split('"')
+            .filter(|word| word.starts_with('/') && !word.contains('\n'))
+            .map(|word| word.replace('.', "/"))
+            .collect();
+        assert!(shown.len() >= 5);
+        for field in shown {
+            assert!(fields.contains(&field), "{field}");
+        }
+    }
+}
+
+/// The reader that Foxglove publishes finds as many messages.
+fn read_by_python(file: &Path, messages: usize) {
+    python(
+        "import sys, json
+from mcap.reader import make_reader
+n = 0
+for schema, channel, message in make_reader(open(sys.argv[1], 'rb')).iter_messages():
+    json.loads(message.data)
+    assert channel.message_encoding == 'json' and schema.encoding == 'jsonschema'
+    n += 1
+assert n == int(sys.argv[2]), n",
+        &[text(file), &messages.to_string()],
+        "mcap",
+    );
+}
+
+/// Runs a program of Python that needs a package; skipped where there is none.
+fn python(program: &str, arguments: &[&str], package: &str) {
+    let python = || Command::new("python3");
+    let has = python().args(["-c", &format!("import {package}")]).output();
+    if !has.is_ok_and(|has| has.status.success()) {
+        tactus_tests::skipped(&format!(
+            "no python3 with {package} (pip install {package})"
+        ));
+        return;
+    }
+    let ran = python()
+        .args(["-c", program])
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(
+        ran.status.success(),
+        "{}",
+        String::from_utf8_lossy(&ran.stderr)
+    );
+}

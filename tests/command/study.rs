@@ -1,0 +1,796 @@
+//! The paper's study: its slides, its arithmetic against f64, and the report that people read.
+
+use std::collections::HashSet;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::sync::OnceLock;
+
+use rand::{Rng, RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus_core::features::Movement;
+use tactus_core::features::Observation;
+use tactus_core::features::{Properties, Property};
+use tactus_core::rig::Fault;
+use tactus_core::table::Table;
+use tactus_lab::eval::evaluate::Method;
+use tactus_study::identify::{Identification, WorldRow, experiment, pairs};
+use tactus_study::pilot::Pilot;
+use tactus_study::published::{IDENTIFIED, PILOT_TEXTURES};
+use tactus_study::report;
+use tactus_study::signals::Signals;
+use tactus_study::slides::{
+    NotReached, Recorded, Session, StudyWorld, TextureTrials, VISIBLE_WEAR,
+};
+use tactus_study::training::{Training, Worn};
+use tactus_study::{Study, VARIATION};
+use tactus_tests::skipped;
+use tactus_world::TRIAL_VARIATION;
+
+const MOVEMENTS: [Movement; 3] = [
+    Movement::FOR_TRACTION,
+    Movement::FOR_FINENESS,
+    Movement::FOR_ROUGHNESS,
+];
+
+fn normal(random: &mut impl Rng) -> f64 {
+    (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0
+}
+
+/// Trials that no rig made: textures with means and deviations of their own, drawn by the seed.
+fn invented(textures: &[u8], movements: usize, trials: usize, seed: u64) -> Vec<TextureTrials> {
+    let of = |&texture: &u8| {
+        // what a texture is like does not depend on the seed
+        let mut like = ChaCha8Rng::seed_from_u64(texture.into());
+        let mut random = ChaCha8Rng::seed_from_u64(1000 * seed + u64::from(texture));
+        let slides = (0..movements).map(|_| {
+            let mean: [f64; 15] = std::array::from_fn(|_| 2.0 + 0.6 * normal(&mut like));
+            let slide = |_| {
+                let observed = mean.map(|mean| mean + 0.1 * normal(&mut random));
+                let [traction, roughness, fineness, bands @ ..] = observed;
+                Observation {
+                    properties: Properties::new(
+                        [traction, roughness, fineness].map(|p| Some(p as f32)),
+                    ),
+                    bands: bands.iter().map(|b| (1024.0 * b) as i16).collect(),
+                    pressure: None,
+                    pace: None,
+                }
+            };
+            (0..trials).map(slide).collect()
+        });
+        TextureTrials {
+            texture,
+            slides: slides.collect(),
+            wear: (0..=movements).map(|m| 0.001 * m as f64).collect(),
+            new_skin: texture == 60,
+            not_reached: Vec::new(),
+        }
+    };
+    textures.iter().map(of).collect()
+}
+
+fn all() -> Vec<u8> {
+    (1..=117).collect()
+}
+
+fn recorded() -> Recorded {
+    Recorded {
+        training: invented(&all(), 3, 5, 1),
+        validation: invented(&IDENTIFIED, 3, 5, 2),
+    }
+}
+
+fn world() -> StudyWorld {
+    StudyWorld {
+        seed: 5,
+        variation: VARIATION,
+    }
+}
+
+/// A whole study, of invented trials but for the signals.
+fn study(simulations: u64) -> Study {
+    let recorded = recorded();
+    let grid: Vec<Movement> = Movement::grid().collect();
+    let worn = [0.0, 0.5].map(|wear| Worn {
+        wear,
+        trials: invented(&PILOT_TEXTURES, 3, 3, 7 + (wear * 2.0) as u64),
+    });
+    let experiment = experiment(&recorded, 5).unwrap();
+    let row = |seed| {
+        let world = StudyWorld { seed, ..world() };
+        WorldRow::run(world, &recorded, simulations, || ()).unwrap()
+    };
+    Study {
+        version: "0.0.0-test",
+        command: "tactus study all --seed 5 --out <here> & now".to_owned(),
+        seed: 5,
+        variation: VARIATION,
+        simulations,
+        pilot: Some(Pilot::of(&grid, &invented(&PILOT_TEXTURES, 36, 6, 3)).unwrap()),
+        training: Some(Training::of(&recorded.training, &worn).unwrap()),
+        pairs: Some(pairs(&experiment, 20, || ()).unwrap()),
+        identification: Some(Identification::run(&experiment, simulations, || ()).unwrap()),
+        signals: Some(Signals::run(world()).unwrap()),
+        worlds: (11..=13).map(row).collect(),
+    }
+}
+
+/// The same study for all tests that only look at it.
+fn shared() -> &'static Study {
+    static STUDY: OnceLock<Study> = OnceLock::new();
+    STUDY.get_or_init(|| study(160))
+}
+
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    pool.build().unwrap().install(work)
+}
+
+/// All files below a folder, by their paths in it.
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if path.is_dir() {
+            let inside = files(&path).into_iter();
+            found.extend(inside.map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            found.push((name, fs::read(&path).unwrap()));
+        }
+    }
+    found.sort();
+    found
+}
+
+fn written(study: &Study) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let written = report::Folder::prepare(folder.path(), "a test").unwrap();
+    report::write(study, written).unwrap();
+    folder
+}
+
+#[test]
+fn every_file_is_the_same_on_any_number_of_threads() {
+    let [one, two] = [1, 2].map(|threads| {
+        let folder = on_threads(threads, || written(&study(160)));
+        files(folder.path())
+    });
+    assert!(one.len() > 50, "{} files", one.len());
+    for (one, two) in one.iter().zip(&two) {
+        assert_eq!(one.0, two.0);
+        assert!(one.1 == two.1, "{} differs", one.0);
+    }
+    assert_eq!(one.len(), two.len());
+    // and another seed is another study
+    let other = Identification::run(&experiment(&recorded(), 6).unwrap(), 160, || ()).unwrap();
+    assert_ne!(Some(other), study(160).identification);
+}
+
+fn session<'a>(textures: &'a [u8], number: u64) -> Session<'a> {
+    Session {
+        textures,
+        movements: &MOVEMENTS,
+        trials: 2,
+        number,
+        force_guard: true,
+        may_miss: false,
+    }
+}
+
+#[test]
+fn slides_are_the_same_on_any_number_of_threads_and_differ_between_sessions() {
+    let calibration = world().calibration().unwrap();
+    let textures = [100, 46, 3];
+    let record = |number| {
+        let session = session(&textures, number);
+        world().record(&session, calibration, || ()).unwrap()
+    };
+    let one = on_threads(1, || record(1));
+    assert_eq!(one, on_threads(2, || record(1)));
+    let other = record(2);
+    assert_ne!(one, other);
+    assert!(one.iter().zip(&other).all(|(a, b)| a.slides != b.slides));
+}
+
+#[test]
+fn the_wear_that_is_planned_is_the_wear_that_comes() {
+    let calibration = world().calibration().unwrap();
+    // sticky ones, slippery ones, soft ones
+    let textures = [46, 43, 30, 100, 84];
+    let trials = world()
+        .record(&session(&textures, 1), calibration, || ())
+        .unwrap();
+    let mut worn = 0.0;
+    for (before, after) in trials.iter().zip(&trials[1..]) {
+        let (came, planned) = (
+            before.wear.last().unwrap() - before.wear[0],
+            after.wear[0] - before.wear[0],
+        );
+        assert!(before.wear.is_sorted() && came > 0.0);
+        assert!(
+            (planned / came - 1.0).abs() < 0.12,
+            "T{}: {came:.5} came, {planned:.5} was planned",
+            before.texture
+        );
+        worn += planned;
+    }
+    assert!(worn < VISIBLE_WEAR && trials.iter().all(|t| !t.new_skin));
+
+    // so often over the same one that the skin has to be changed
+    let many = vec![46; 60];
+    let skins = world().skins(&session(&many, 1));
+    let changed: Vec<usize> = (0..many.len()).filter(|&n| skins[n].2).collect();
+    assert!(!changed.is_empty());
+    for (n, (_, wear, new)) in skins.iter().enumerate() {
+        assert_eq!(*new, n > 0 && *wear == 0.0);
+        assert!(*wear < VISIBLE_WEAR);
+    }
+}
+
+/// Standard deviation of the traction over the trials of one texture in this world, N.
+fn spread_in(seed: u64, variation: f64) -> f64 {
+    let world = StudyWorld { seed, variation };
+    let calibration = world.calibration().unwrap();
+    let session = Session {
+        trials: 6,
+        movements: &[Movement::FOR_FINENESS],
+        ..session(&[41], 1)
+    };
+    let trials = world.record(&session, calibration, || ()).unwrap();
+    let traction: Vec<f64> = trials[0].slides[0]
+        .iter()
+        .map(|s| s.properties.get(Property::Traction).unwrap().into())
+        .collect();
+    deviation(&traction)
+}
+
+#[test]
+fn variation_is_what_tells_trials_apart() {
+    // of six trials a deviation is known to a third: of six worlds, to an eighth
+    let spread = |variation: f64| {
+        let variance = |seed| spread_in(seed, variation).powi(2);
+        ((1..=6).map(variance).sum::<f64>() / 6.0).sqrt()
+    };
+    let [none, usual, twice] = [0.0, TRIAL_VARIATION, 2.0 * TRIAL_VARIATION].map(spread);
+    assert!(
+        2.0 * none < usual && 1.5 * usual < twice,
+        "{none} {usual} {twice}"
+    );
+}
+
+fn mean(of: &[f64]) -> f64 {
+    of.iter().sum::<f64>() / of.len() as f64
+}
+
+fn deviation(of: &[f64]) -> f64 {
+    let squares: f64 = of.iter().map(|x| (x - mean(of)).powi(2)).sum();
+    (squares / (of.len() - 1) as f64).sqrt()
+}
+
+fn values(trials: &[[f32; 3]], property: usize) -> Vec<f64> {
+    trials.iter().map(|p| p[property].into()).collect()
+}
+
+/// Eq. 7 in f64.
+fn confusion(a: (f64, f64), b: (f64, f64)) -> f64 {
+    let variances = a.1 * a.1 + b.1 * b.1;
+    (2.0 * a.1 * b.1 / variances).sqrt() * (-(a.0 - b.0).powi(2) / (4.0 * variances)).exp()
+}
+
+/// What the rig cannot press is shown as that, and nothing else changes.
+#[test]
+fn a_movement_that_is_not_reached_is_a_result() {
+    let grid: Vec<Movement> = Movement::grid().collect();
+    let mut trials = invented(&PILOT_TEXTURES, 36, 6, 3);
+    let all = Pilot::of(&grid, &trials).unwrap();
+    let foam = trials.iter_mut().find(|t| t.texture == 30).unwrap();
+    foam.slides[30].truncate(2);
+    foam.not_reached.push(NotReached {
+        movement: 30,
+        trial: 3,
+        why: Fault::LeverSlips.into(),
+    });
+    let pilot = Pilot::of(&grid, &trials).unwrap();
+    for (movement, (without, with)) in pilot.movements.iter().zip(&all.movements).enumerate() {
+        if movement == 30 {
+            assert_eq!(without.uncertainty, [1.0; 3]);
+            assert_eq!(without.not_reached.len(), 1);
+        } else {
+            assert_eq!(without, with);
+        }
+    }
+    let study = Study {
+        pilot: Some(pilot),
+        training: None,
+        pairs: None,
+        identification: None,
+        signals: None,
+        worlds: Vec::new(),
+        ..shared().clone()
+    };
+    let folder = written(&study);
+    let said = files(folder.path())
+        .into_iter()
+        .map(|(_, bytes)| String::from_utf8_lossy(&bytes).into_owned());
+    let naming = said.filter(|text| text.contains("not reached: T30, trial 3: lever slips"));
+    // the page and the table of movements
+    assert_eq!(naming.count(), 2);
+    let json: serde_json::Value = serde_json::from_str(&report::json(&study).unwrap()).unwrap();
+    let missed = &json["pilot"]["movements"][30]["not_reached"][0];
+    assert_eq!(
+        (&missed["texture"], &missed["trial"]),
+        (&30.into(), &3.into())
+    );
+}
+
+#[test]
+fn uncertainty_of_the_pilot_is_eq_11_in_f64() {
+    let pilot = shared().pilot.as_ref().unwrap();
+    for (m, movement) in pilot.movements.iter().enumerate() {
+        for property in 0..3 {
+            let normals: Vec<(f64, f64)> = pilot
+                .properties
+                .iter()
+                .map(|texture| values(&texture[m], property))
+                .map(|values| (mean(&values), deviation(&values)))
+                .collect();
+            let p = 1.0 / normals.len() as f64;
+            let left: f64 = normals
+                .iter()
+                .map(|a| p * p / normals.iter().map(|b| confusion(*a, *b) * p).sum::<f64>())
+                .sum();
+            let found = f64::from(movement.uncertainty[property]);
+            // the table rounds means and deviations
+            assert!(
+                (found - (1.0 - left)).abs() < 2e-3,
+                "{m} {property}: {found} {left}"
+            );
+        }
+    }
+    for useful in &pilot.most_useful {
+        let property = useful.property.index();
+        let best = pilot.movements.iter().filter(|m| !m.high_wear);
+        let best = best.map(|m| m.uncertainty[property]).fold(1.0, f32::min);
+        assert_eq!(pilot.movements[useful.movement].uncertainty[property], best);
+        assert!(!pilot.movements[useful.movement].high_wear);
+    }
+    assert_eq!(pilot.movements.iter().filter(|m| m.high_wear).count(), 21);
+}
+
+#[test]
+fn confusion_and_its_geometric_mean_are_those_of_f64() {
+    let training = shared().training.as_ref().unwrap();
+    assert_eq!(training.confusion.len(), 9);
+    let gaussian = |texture: usize, c: &tactus_study::training::Confusion| {
+        let trials = &training.textures[texture].properties[c.movement];
+        let values = values(trials, c.property.index());
+        (mean(&values), deviation(&values))
+    };
+    for (a, b) in [(0, 0), (0, 2), (49, 53), (116, 3), (56, 57)] {
+        let (mut nine, mut three) = (0.0, 0.0);
+        for c in &training.confusion {
+            let degree = confusion(gaussian(a, c), gaussian(b, c));
+            let found = f64::from(c.matrix[a][b]);
+            assert!((found - degree).abs() < 5e-3, "{a} {b}: {found} {degree}");
+            assert_eq!(c.matrix[a][b], c.matrix[b][a]);
+            nine += found.ln() / 9.0;
+            let useful = [(0, "traction"), (1, "fineness"), (2, "roughness")];
+            if useful.contains(&(c.movement, c.property.name())) {
+                three += found.ln() / 3.0;
+            }
+        }
+        let [all, useful] = [
+            &training.geometric_mean,
+            &training.geometric_mean_most_useful,
+        ]
+        .map(|m| f64::from(m[a][b]));
+        assert!((all - nine.exp()).abs() < 1e-6 && (useful - three.exp()).abs() < 1e-6);
+    }
+    let over = (0..117).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let over = over.filter(|&(i, j)| training.geometric_mean[i][j] > 0.5);
+    assert_eq!(over.count(), training.pairs_confused.0);
+}
+
+#[test]
+fn correlations_are_those_of_f64() {
+    let training = shared().training.as_ref().unwrap();
+    for (m, correlations) in training.correlations.iter().enumerate() {
+        let means = |property| -> Vec<f64> {
+            let of = training.textures.iter();
+            of.map(|t| mean(&values(&t.properties[m], property)))
+                .collect()
+        };
+        for (a, b) in [(0, 0), (0, 1), (0, 2), (2, 1)] {
+            let (x, y) = (means(a), means(b));
+            // by the products of standard scores
+            let (sx, sy) = (deviation(&x), deviation(&y));
+            let scores = x
+                .iter()
+                .zip(&y)
+                .map(|(p, q)| (p - mean(&x)) / sx * ((q - mean(&y)) / sy));
+            let expected = scores.sum::<f64>() / 116.0;
+            let found = correlations.ours[a][b];
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_tables_are_the_chips() {
+    let training = shared().training.as_ref().unwrap();
+    for file in &training.tables {
+        let table = Table::read(&file.data).unwrap();
+        assert_eq!((table.textures(), table.movements().len()), (117, 3));
+        assert_eq!(format!("{:08x}", table.crc()), file.crc);
+        assert_eq!(table.name(99), Some("Burlap"));
+    }
+}
+
+#[test]
+fn columns_add_up() {
+    let identification = shared().identification.as_ref().unwrap();
+    for column in &identification.columns {
+        // each of the 16 is unknown as often
+        assert!((mean(&column.textures) - column.correct).abs() < 1e-9);
+        assert!(column.converged <= column.correct);
+        assert!(column.mean <= 10.0 && column.median <= 11.0);
+    }
+    let fused = identification.column(Method::Fused).unwrap();
+    assert!(fused.correct > 99.0, "{fused:?}");
+    for evolution in &identification.evolutions {
+        let last = |(_, p): &(_, Vec<f32>)| *p.last().unwrap();
+        let steps = evolution.steps.len() + 1;
+        let probabilities = &evolution.probabilities;
+        assert!(probabilities.iter().all(|(_, p)| p.len() == steps));
+        let best = probabilities
+            .iter()
+            .max_by(|a, b| last(a).total_cmp(&last(b)));
+        assert_eq!(best.unwrap().0, evolution.identified);
+        assert_eq!(last(best.unwrap()) > 0.99, evolution.sure);
+    }
+}
+
+#[test]
+fn a_press_gives_the_papers_line() {
+    let press = &shared().signals.as_ref().unwrap().press;
+    assert!(
+        (press.mn_per_count - 11.5).abs() < 0.6,
+        "{}",
+        press.mn_per_count
+    );
+    assert!(
+        press.r_squared > 0.99 && press.r_squared < 1.0,
+        "{}",
+        press.r_squared
+    );
+    let most = press.loading.iter().map(|p| p.1).fold(0.0, f64::max);
+    assert!((2.4..2.7).contains(&most), "{most} N");
+}
+
+/// The fields of a table's file.
+fn rows(folder: &Path, table: &str) -> Vec<Vec<String>> {
+    let mut reader = csv::Reader::from_path(folder.join(format!("tables/{table}.csv"))).unwrap();
+    let header = reader.headers().unwrap().clone();
+    std::iter::once(Ok(header))
+        .chain(reader.into_records())
+        .map(|row| row.unwrap().iter().map(str::to_owned).collect())
+        .collect()
+}
+
+#[test]
+fn csv_and_json_have_the_same_numbers() {
+    let folder = written(shared());
+    let folder = folder.path();
+    let text = fs::read_to_string(folder.join("study.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let same = |field: &str, value: &serde_json::Value| {
+        let (file, value) = (field.parse::<f64>().unwrap(), value.as_f64().unwrap());
+        // serde_json reads to the last digit but one
+        assert!(
+            (file - value).abs() <= 1e-15 * value.abs(),
+            "{field} {value}"
+        );
+    };
+
+    let table5 = rows(folder, "table5-identification");
+    for (place, column) in [(2, 0), (4, 1), (6, 2), (7, 3)] {
+        let ours = &json["identification"]["columns"][column];
+        same(&table5[1][place], &ours["correct"]);
+        same(&table5[2][place], &ours["converged"]);
+        same(&table5[4][place], &ours["median"]);
+        for texture in 0..16 {
+            same(&table5[6 + texture][place], &ours["textures"][texture]);
+        }
+    }
+    assert_eq!(
+        [&table5[1][1], &table5[1][3], &table5[1][5]],
+        ["49.9", "84.1", "95.4"]
+    );
+
+    let table4 = rows(folder, "table4-pairs");
+    for (row, pair) in table4[1..9].iter().zip(json["pairs"].as_array().unwrap()) {
+        same(&row[1], &pair["paper"][0]);
+        same(&row[2], &pair["paper"][1]);
+        same(&row[3], &pair["correct"]);
+    }
+    let matrix = rows(folder, "confusion-2-fineness");
+    let of = json["training"]["confusion"].as_array().unwrap();
+    let of = of
+        .iter()
+        .find(|c| c["movement"] == 1 && c["property"] == "Fineness")
+        .unwrap();
+    for (row, of) in matrix[1..].iter().zip(of["matrix"].as_array().unwrap()) {
+        row.iter()
+            .zip(of.as_array().unwrap())
+            .for_each(|(f, v)| same(f, v));
+    }
+    let movements = rows(folder, "movements");
+    for (row, of) in movements[1..]
+        .iter()
+        .zip(json["pilot"]["movements"].as_array().unwrap())
+    {
+        same(&row[0], &of["force_n"]);
+        same(&row[4], &of["wear"]);
+        same(&row[7], &of["uncertainty"][2]);
+    }
+    assert_eq!(json["seed"], 5);
+    assert_eq!(json["version"], "0.0.0-test");
+}
+
+/// Every figure of the paper that the study makes, by what its file's name begins with.
+const FIGURES: [&str; 9] = [
+    "fig3",
+    "fig4-signal",
+    "fig4-spectrum",
+    "fig5-",
+    "fig6",
+    "fig7-",
+    "fig8-",
+    "fig9-",
+    "fig10-",
+];
+
+#[test]
+fn the_page_is_whole() {
+    let folder = written(shared());
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        nodes_limit: u32::MAX,
+        ..Default::default()
+    };
+    let document = roxmltree::Document::parse_with_options(&page, options).unwrap();
+    let elements = || document.descendants().filter(|n| n.is_element());
+    let ids: Vec<&str> = elements().filter_map(|n| n.attribute("id")).collect();
+    assert_eq!(
+        ids.len(),
+        ids.iter().collect::<HashSet<_>>().len(),
+        "an id comes twice"
+    );
+
+    // nothing is fetched, nothing runs
+    for node in elements() {
+        assert!(!["script", "img", "iframe", "object"].contains(&node.tag_name().name()));
+        assert_eq!(node.attribute("src"), None);
+        if let Some(to) = node.attribute("href") {
+            match to.strip_prefix('#') {
+                Some(id) => assert!(ids.contains(&id), "{to} leads nowhere"),
+                None => assert!(
+                    to == "data:," || folder.path().join(to).is_file(),
+                    "{to} is not there"
+                ),
+            }
+        }
+    }
+    assert!(!page.contains("@import") && !page.contains("url("));
+    assert_eq!(document.root_element().attribute("lang"), Some("en"));
+    let has = |name: &str, key, value| {
+        let mut of = elements().filter(|n| n.tag_name().name() == name);
+        of.any(|n| n.attribute(key) == Some(value))
+    };
+    assert!(has("meta", "charset", "utf-8"));
+    assert!(has("meta", "name", "viewport"));
+    let style = elements().find(|n| n.tag_name().name() == "style").unwrap();
+    let style = style.text().unwrap();
+    assert!(style.contains("@media print") && style.contains("max-width:600px"));
+
+    // every figure: in the page and as a file, with words on both axes
+    let panels: Vec<_> = elements()
+        .filter(|n| n.attribute("class") == Some("panel"))
+        .collect();
+    for begin in FIGURES {
+        let begin = format!("figure-{begin}");
+        assert!(
+            panels
+                .iter()
+                .any(|p| p.attribute("id").unwrap().starts_with(&begin)),
+            "{begin}"
+        );
+    }
+    for panel in &panels {
+        let id = panel.attribute("id").unwrap();
+        let svg = panel.first_element_child().unwrap();
+        assert_eq!(
+            (svg.tag_name().name(), svg.attribute("role")),
+            ("svg", Some("img"))
+        );
+        let title = svg.first_element_child().unwrap();
+        assert_eq!(title.tag_name().name(), "title");
+        assert!(title.text().is_some_and(|title| !title.is_empty()));
+        let words: String = svg
+            .descendants()
+            .filter(|n| n.tag_name().name() == "text")
+            .filter_map(|n| n.text())
+            .collect();
+        let has_unit = [
+            "(N)",
+            "Hz)",
+            "(mm/s)",
+            "(s)",
+            "(%)",
+            "(Pa)",
+            "counts",
+            "Table 1",
+            "probability",
+            "standard deviations",
+        ];
+        assert!(
+            has_unit.iter().any(|unit| words.contains(unit)),
+            "{id}: {words}"
+        );
+        assert!(
+            !words.contains("NaN") && !words.contains("inf"),
+            "{id}: {words}"
+        );
+        let name = id.strip_prefix("figure-").unwrap();
+        let file = fs::read_to_string(folder.path().join(format!("figures/{name}.svg"))).unwrap();
+        roxmltree::Document::parse(&file).unwrap();
+        assert!(
+            page.contains(&file["<svg ".len()..]),
+            "{id} is another one in its file"
+        );
+    }
+    let figures = fs::read_dir(folder.path().join("figures")).unwrap().count();
+    assert_eq!(figures, panels.len());
+
+    // every table: rows as long as the header, a caption, a file
+    let tables: Vec<_> = elements()
+        .filter(|n| n.tag_name().name() == "table")
+        .collect();
+    assert!(tables.len() >= 10);
+    for table in tables {
+        let of = |name: &'static str| {
+            table
+                .descendants()
+                .filter(move |n| n.tag_name().name() == name)
+        };
+        let header = of("th").count();
+        let caption = of("caption").next().unwrap();
+        assert!(caption.descendants().any(|n| n.is_text()));
+        for row in of("tbody")
+            .next()
+            .unwrap()
+            .children()
+            .filter(|n| n.is_element())
+        {
+            assert_eq!(row.children().filter(|n| n.is_element()).count(), header);
+        }
+    }
+    // what it was made by
+    let words: String = document
+        .descendants()
+        .filter(|n| n.is_text())
+        .filter_map(|n| n.text())
+        .collect();
+    for said in [
+        "0.0.0-test",
+        "tactus study all --seed 5 --out <here> & now",
+        "world 5",
+        "95.4",
+    ] {
+        assert!(words.contains(said), "{said}");
+    }
+}
+
+#[test]
+fn a_browser_shows_all_of_it_without_a_complaint() {
+    let browsers = ["chromium", "chromium-browser", "google-chrome"];
+    let found = browsers.into_iter().find(|browser| {
+        let version = Command::new(browser).arg("--version").output();
+        version.is_ok_and(|out| out.status.success())
+    });
+    let Some(browser) = found else {
+        return skipped("no Chromium (apt-get install chromium); the report was not opened");
+    };
+    let folder = written(shared());
+    let home = tempfile::tempdir().unwrap();
+    let shown = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--dump-dom",
+        ])
+        .arg(format!("--user-data-dir={}", home.path().display()))
+        .arg(format!(
+            "file://{}",
+            folder.path().join("report.html").display()
+        ))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&shown.stderr);
+    let complaints: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("CONSOLE"))
+        .collect();
+    assert!(
+        shown.status.success() && complaints.is_empty(),
+        "{complaints:#?}"
+    );
+    let dom = String::from_utf8(shown.stdout).unwrap();
+    let figures = fs::read_dir(folder.path().join("figures")).unwrap();
+    for figure in figures {
+        let name = figure.unwrap().file_name().into_string().unwrap();
+        let id = format!("id=\"figure-{}\"", name.strip_suffix(".svg").unwrap());
+        assert!(dom.contains(&id), "{name} is not shown");
+    }
+    assert_eq!(
+        dom.matches("<svg").count(),
+        fs::read_dir(folder.path().join("figures")).unwrap().count()
+    );
+}
+
+fn complaint(arguments: &[&str], code: i32) -> String {
+    let out = Command::new(env!("CARGO_BIN_EXE_tactus"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}");
+    assert!(!said.contains("panicked"), "{said}");
+    said
+}
+
+#[test]
+fn mistakes_are_told_before_the_work_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let taken = folder.path().join("taken");
+    fs::create_dir(&taken).unwrap();
+    fs::write(taken.join("mine.txt"), "mine").unwrap();
+    let said = complaint(&["study", "pilot", "--out", taken.to_str().unwrap()], 1);
+    assert!(
+        said.contains("taken: is not empty") && said.contains("new folder"),
+        "{said}"
+    );
+    assert_eq!(files(&taken).len(), 1, "what was there stays alone");
+
+    let below_a_file = taken.join("mine.txt").join("study");
+    let said = complaint(
+        &["study", "all", "--out", below_a_file.to_str().unwrap()],
+        1,
+    );
+    assert!(
+        said.contains("mine.txt") && said.contains("can be written"),
+        "{said}"
+    );
+
+    for (wrong, hint) in [
+        (["--seeds", "20-11"], "11-20"),
+        (["--seeds", "1-200"], "at most 100"),
+        (["--variation", "4"], "a factor from 0 to 3"),
+        (["--simulations", "3"], "16..=1000000"),
+        (["--format", "xml"], "json"),
+    ] {
+        let mut arguments = vec!["study", "identify", "--out", "/nowhere"];
+        arguments.extend(wrong);
+        let said = complaint(&arguments, 2);
+        assert!(said.contains(hint), "{wrong:?}: {said}");
+    }
+    let said = complaint(&["study", "identify"], 2);
+    assert!(said.contains("--out"), "{said}");
+    let said = complaint(&["study", "everything", "--out", "x"], 2);
+    assert!(said.contains("identify"), "{said}");
+}

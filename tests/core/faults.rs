@@ -1,0 +1,1081 @@
+//! Every fault of the table on the simulated rig, judged by what really happens there: the force, the lever, the stage.
+//!
+//! Each fault is injected at seeded instants of several phases. With its guard switched off the same judge must object.
+
+use std::time::Duration;
+
+use rayon::prelude::*;
+use tactus_core::features::Movement;
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::control::Control;
+use tactus_core::rig::guard::Unguarded;
+use tactus_core::rig::pins::Inputs;
+use tactus_core::rig::stage::StageConstants;
+use tactus_core::rig::{Ended, Phase, Refused};
+use tactus_core::rig::{FAULTS, Fault};
+use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::pressure::{Calibration, Channel, Counts, Pressure};
+use tactus_lab::sim::rig::{SimError, SimRig};
+use tactus_world::encoder::Cut;
+use tactus_world::faults::{BOUNCES_NS, Fault as Cause};
+use tactus_world::world::Setup;
+
+/// When the cause comes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum When {
+    /// While the limit switches are looked for.
+    Homing,
+    /// While the stage goes back, the finger lifted.
+    Returning,
+    /// While the lever comes down, not yet in contact.
+    Approaching,
+    /// While the lever comes down, in contact.
+    Touching,
+    /// While the force is being trimmed.
+    Settling,
+    /// In the background or the slide.
+    Background,
+    /// At constant speed.
+    Sliding,
+    /// In the last 29 ms of a slide.
+    Arriving,
+}
+
+/// From which moment the fault can be detected.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Since {
+    /// The cause itself.
+    Cause,
+    /// Its contact no longer bounces.
+    Settled,
+    /// The stage is to move.
+    Motion,
+    /// The real force is over 2.1 N.
+    Force,
+    /// The lever is well below its limit switch.
+    LeverDown,
+    /// It takes the machine's own time: no deadline, but an end within a minute.
+    Own,
+}
+
+struct Case {
+    fault: Fault,
+    cause: Cause,
+    when: &'static [When],
+    since: Since,
+}
+
+const PRESSED: &[When] = &[
+    When::Approaching,
+    When::Settling,
+    When::Background,
+    When::Sliding,
+];
+const ALL: &[When] = &[
+    When::Returning,
+    When::Approaching,
+    When::Settling,
+    When::Background,
+    When::Sliding,
+];
+const MOVING: &[When] = &[When::Returning, When::Sliding];
+
+const CASES: &[Case] = &[
+    Case {
+        fault: Fault::ForceHigh,
+        cause: Cause::LeverRunaway,
+        when: PRESSED,
+        since: Since::Force,
+    },
+    Case {
+        fault: Fault::EStop,
+        cause: Cause::EStop,
+        when: ALL,
+        since: Since::Settled,
+    },
+    Case {
+        fault: Fault::LeverLimit,
+        cause: Cause::LeverTopStuck { closed: true },
+        when: ALL,
+        since: Since::LeverDown,
+    },
+    Case {
+        fault: Fault::StageLimit,
+        cause: Cause::StageLimitStuck {
+            upper: true,
+            closed: true,
+        },
+        when: &[
+            When::Approaching,
+            When::Settling,
+            When::Background,
+            When::Sliding,
+        ],
+        since: Since::Motion,
+    },
+    Case {
+        fault: Fault::StageLimit,
+        cause: Cause::StageLimitStuck {
+            upper: false,
+            closed: true,
+        },
+        when: &[When::Returning],
+        since: Since::Motion,
+    },
+    Case {
+        fault: Fault::StageStall,
+        cause: Cause::StageJammed,
+        when: ALL,
+        since: Since::Motion,
+    },
+    Case {
+        fault: Fault::EncoderSilent,
+        cause: Cause::EncoderCut(Cut::A),
+        when: ALL,
+        since: Since::Motion,
+    },
+    Case {
+        fault: Fault::EncoderSilent,
+        cause: Cause::EncoderCut(Cut::B),
+        when: MOVING,
+        since: Since::Motion,
+    },
+    Case {
+        fault: Fault::EncoderSilent,
+        cause: Cause::EncoderCut(Cut::Both),
+        when: MOVING,
+        since: Since::Motion,
+    },
+    Case {
+        fault: Fault::SensorSilent,
+        cause: Cause::SensorUnplugged,
+        when: ALL,
+        since: Since::Cause,
+    },
+    Case {
+        fault: Fault::SensorSilent,
+        cause: Cause::MisoStuck { high: true },
+        when: ALL,
+        since: Since::Cause,
+    },
+    Case {
+        fault: Fault::SensorSilent,
+        cause: Cause::MisoStuck { high: false },
+        when: ALL,
+        since: Since::Cause,
+    },
+    Case {
+        fault: Fault::SensorErrors,
+        cause: Cause::BitFlips { share: 0.05 },
+        when: PRESSED,
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::SensorFrozen,
+        cause: Cause::SensorFrozen,
+        when: ALL,
+        since: Since::Cause,
+    },
+    Case {
+        fault: Fault::SlideGap,
+        cause: Cause::BitFlips { share: 0.002 },
+        when: &[When::Background, When::Sliding],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::NoContact,
+        cause: Cause::LeverLosesSteps { share: 1.0 },
+        when: &[When::Approaching],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::LeverSlips,
+        cause: Cause::LeverLosesSteps { share: 0.9 },
+        when: &[When::Touching],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::PressureDead,
+        cause: Cause::PdcStuck,
+        when: &[When::Approaching, When::Touching],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::PressureDead,
+        cause: Cause::PdcFades { seconds: 0.0 },
+        when: &[When::Touching],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::StageNotHome,
+        cause: Cause::EncoderCut(Cut::Both),
+        when: &[When::Homing],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::StageOff,
+        cause: Cause::StageJammed,
+        when: &[When::Arriving],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::Unsteady,
+        cause: Cause::PdcDrift {
+            counts_per_s: -20.0,
+        },
+        when: &[When::Settling],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::LeverNotHome,
+        cause: Cause::LeverTopStuck { closed: false },
+        when: &[When::Homing],
+        since: Since::Own,
+    },
+    Case {
+        fault: Fault::StageNotHome,
+        cause: Cause::StageLimitStuck {
+            upper: false,
+            closed: false,
+        },
+        when: &[When::Homing],
+        since: Since::Own,
+    },
+];
+
+/// A number from 0 to below `n`, the same for the same seed.
+fn draw(seed: u64, n: u64) -> u64 {
+    let mut x = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5bf0_3635;
+    x ^= x >> 31;
+    x = x.wrapping_mul(0x94d0_49bb_1331_11eb);
+    (x ^ (x >> 29)) % n
+}
+
+/// Ticks until `reached`, or an objection.
+fn until(
+    rig: &mut SimRig,
+    what: &str,
+    mut reached: impl FnMut(&mut SimRig) -> bool,
+) -> Result<u32, String> {
+    for ms in 0..120_000 {
+        if reached(rig) {
+            return Ok(ms);
+        }
+        rig.tick();
+    }
+    Err(format!("never {what}: {:?}", rig.control().phase()))
+}
+
+/// Injects the cause and judges what becomes of it.
+fn judge(case: &Case, when: When, seed: u64, unguarded: Unguarded) -> Result<(), String> {
+    let texture = 1 + draw(seed, 117) as u8;
+    let setup = Setup {
+        texture,
+        world_seed: 1,
+        trial_seed: seed,
+        finger_seed: 1,
+        ..Setup::default()
+    };
+    let mut rig = SimRig::unguarded(setup, unguarded);
+    // a lever that runs away needs the time of a long slide to get to 2.1 N
+    let choice = match when {
+        _ if case.fault == Fault::ForceHigh => 0,
+        When::Touching => 0,
+        When::Arriving => 2,
+        _ => draw(seed + 1, 3),
+    };
+    let movement = MOVEMENTS[choice as usize];
+    // up to the cause nothing can be wrong: what goes wrong here is the test's
+    if when == When::Homing {
+        for _ in 0..100 {
+            rig.tick();
+        }
+        rig.world().inject(case.cause);
+        rig.control().home().unwrap();
+    } else {
+        rig.home().unwrap();
+        if when == When::Returning {
+            // from the end of a slide to the beginning of the next, the finger clear of the sample
+            rig.slide(movement, 1.0, |_, _| ()).unwrap();
+        }
+        rig.control().start(movement, 0.3).unwrap();
+        let (phase, wait_ms) = match when {
+            When::Returning => (Phase::Positioning, 40 + draw(seed + 2, 400)),
+            When::Approaching => (Phase::Pressing, 400 + draw(seed + 2, 1000)),
+            When::Touching => (Phase::Pressing, 0),
+            When::Settling => (Phase::Pressing, draw(seed + 2, 300)),
+            When::Background => (Phase::Background, draw(seed + 2, 900)),
+            When::Homing | When::Sliding | When::Arriving => {
+                (Phase::Sliding, 120 + draw(seed + 2, 600))
+            }
+        };
+        until(&mut rig, "in the phase", |rig| {
+            rig.control().phase() == phase
+        })
+        .unwrap();
+        if when == When::Settling {
+            // a P_DC that sinks before the force is reached is dead, and no unsteady force
+            let share = if case.fault == Fault::Unsteady {
+                0.97
+            } else {
+                0.9
+            };
+            until(&mut rig, "touching", |rig| {
+                rig.world().truth().force_n > share * f64::from(movement.force_n())
+            })
+            .unwrap();
+        }
+        if when == When::Touching {
+            until(&mut rig, "touching", |rig| {
+                rig.world().truth().force_n > 0.3
+            })
+            .unwrap();
+        }
+        for _ in 0..wait_ms {
+            rig.tick();
+        }
+        if when == When::Arriving {
+            until(&mut rig, "arriving", |rig| {
+                rig.world().truth().speed_mm_s < 29.0
+            })
+            .unwrap();
+        }
+        rig.world().inject(case.cause);
+    }
+    rig.world().reset_extremes();
+
+    // to the end, and how long it took from the moment it could be seen
+    let mut detectable_ms = 0;
+    let pressed_n = rig.world().truth().force_n;
+    let settled = rig.now() + Duration::from_nanos(BOUNCES_NS);
+    let faulted =
+        |rig: &mut SimRig| matches!(rig.control().phase(), Phase::Faulted(_) | Phase::Ready);
+    let detectable = |rig: &mut SimRig| match case.since {
+        Since::Cause => true,
+        Since::Settled => rig.now() > settled,
+        Since::Own => false,
+        Since::Force => rig.world().truth().force_n > 2.1,
+        Since::LeverDown => rig.world().truth().tip_mm < 14.4,
+        Since::Motion => matches!(rig.control().phase(), Phase::Positioning | Phase::Sliding),
+    };
+    until(&mut rig, "noticed", |rig| {
+        if faulted(rig) {
+            return true;
+        }
+        detectable_ms += u32::from(detectable(rig));
+        false
+    })?;
+    let row = case.fault.row().ok_or("not in the table")?;
+    if case.fault == Fault::SlideGap {
+        let ended = rig.control().take_ended();
+        return match ended {
+            Some(Ended::Gap(_)) => Ok(()),
+            _ => Err(format!("a slide with damaged words ended as {ended:?}")),
+        };
+    }
+    match rig.control().phase() {
+        Phase::Faulted(fault) if fault == case.fault => {}
+        other => return Err(format!("{other:?} in place of {}", row.name)),
+    }
+    if detectable_ms > row.deadline_ms {
+        return Err(format!(
+            "noticed after {detectable_ms} ms of {}",
+            row.deadline_ms
+        ));
+    }
+    if rig.outputs().stage_duty != 0.0 || rig.outputs().lever_steps_s > 0 {
+        return Err(format!("the motors run on: {:?}", rig.outputs()));
+    }
+    let refused = rig.control().start(movement, 0.0);
+    if refused != Err(Refused::Fault(case.fault)) {
+        return Err(format!("a movement was not refused: {refused:?}"));
+    }
+    let ended = rig.rest(|_| ());
+    // a lever that makes no steps cannot lift either, and that is then the fault
+    let without_power = case.cause == Cause::EStop;
+    let stuck = matches!(case.cause, Cause::LeverLosesSteps { .. });
+    if ended != Err(SimError::Fault(case.fault))
+        && !(stuck && ended == Err(SimError::Fault(Fault::LeverNotHome)))
+    {
+        return Err(format!("ended as {ended:?}"));
+    }
+    // the stage stops
+    for _ in 0..200 {
+        rig.tick();
+    }
+    let truth = rig.world().truth();
+    if truth.force_max_n > 2.2 {
+        return Err(format!("pressed with {:.3} N", truth.force_max_n));
+    }
+    if without_power && truth.force_max_n > pressed_n + 0.01 {
+        return Err(format!("pressed on without power: {truth:?}"));
+    }
+    let must_be_lifted = case.fault != Fault::LeverNotHome && !without_power;
+    if must_be_lifted && (truth.force_n != 0.0 || truth.indentation_mm > -0.5) {
+        return Err(format!("the finger is not lifted: {truth:?}"));
+    }
+    if truth.speed_mm_s.abs() > 0.1 {
+        return Err(format!("the stage moves with {} mm/s", truth.speed_mm_s));
+    }
+    // and works again
+    rig.world().clear();
+    rig.control()
+        .reset()
+        .map_err(|e| format!("does not reset: {e}"))?;
+    rig.home()
+        .map_err(|e| format!("does not find home again: {e}"))?;
+    match rig.slide(movement, 0.5, |_, _| ()) {
+        Ok(Ended::Whole) => Ok(()),
+        other => Err(format!("does not slide again: {other:?}")),
+    }
+}
+
+#[test]
+fn every_fault_is_noticed_in_time_and_does_no_harm() {
+    let runs: Vec<_> = CASES
+        .iter()
+        .flat_map(|case| {
+            case.when
+                .iter()
+                .flat_map(move |&when| (0..4).map(move |seed| (case, when, 1000 + seed)))
+        })
+        .collect();
+    let objections: Vec<String> = runs
+        .par_iter()
+        .filter_map(|&(case, when, seed)| {
+            let why = judge(case, when, seed, Unguarded::default()).err()?;
+            Some(format!(
+                "{:?} by {:?} while {when:?}, seed {seed}: {why}",
+                case.fault, case.cause
+            ))
+        })
+        .collect();
+    println!("{} injections", runs.len());
+    assert!(
+        objections.is_empty(),
+        "{} of {}\n{}",
+        objections.len(),
+        runs.len(),
+        objections.join("\n")
+    );
+}
+
+#[test]
+fn every_guard_is_missed_when_it_is_switched_off() {
+    let runs: Vec<_> = CASES
+        .iter()
+        .flat_map(|case| case.when.iter().map(move |&when| (case, when)))
+        .collect();
+    let missed: Vec<String> = runs
+        .par_iter()
+        .map(|&(case, when)| {
+            let what = format!("{:?} by {:?} while {when:?}", case.fault, case.cause);
+            match judge(case, when, 1003, Unguarded::against(case.fault)) {
+                Ok(()) => format!("NOT MISSED {what}"),
+                Err(why) => format!("{what}: {why}"),
+            }
+        })
+        .collect();
+    println!("{}", missed.join("\n"));
+    assert!(
+        !missed.iter().any(|m| m.starts_with("NOT MISSED")),
+        "{}",
+        missed.join("\n")
+    );
+}
+
+#[test]
+fn every_fault_of_the_table_is_tested() {
+    // three rejected slides: with the exploration, in the core; tasks that hang: on the emulated board; an arm's: tests/arm.rs
+    let elsewhere = [
+        Fault::Rejected,
+        Fault::TasksHung,
+        Fault::ArmSilent,
+        Fault::ArmRuns,
+        Fault::ArmOff,
+    ];
+    for row in FAULTS {
+        let tested =
+            CASES.iter().any(|case| case.fault == row.fault) || elsewhere.contains(&row.fault);
+        assert!(tested, "{}", row.name);
+    }
+}
+
+/// A rig that presses, its finger on the sample.
+fn pressed(unguarded: Unguarded) -> SimRig {
+    let mut rig = SimRig::unguarded(
+        Setup {
+            texture: 45,
+            ..Setup::default()
+        },
+        unguarded,
+    );
+    rig.home().unwrap();
+    rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
+    until(&mut rig, "sliding", |rig| {
+        rig.control().phase() == Phase::Sliding
+    })
+    .unwrap();
+    rig
+}
+
+fn wait(rig: &mut SimRig, ms: u32) {
+    for _ in 0..ms {
+        rig.tick();
+    }
+}
+
+#[test]
+fn a_finger_that_was_not_lifted_is_not_dragged_along() {
+    let first_fault = |unguarded| {
+        let mut rig = pressed(unguarded);
+        rig.world().inject(Cause::LeverLosesSteps { share: 1.0 });
+        let noticed = until(&mut rig, "noticed", |rig| {
+            !matches!(rig.control().phase(), Phase::Sliding | Phase::Lifting)
+        });
+        let phase = noticed.map(|_| rig.control().phase());
+        (phase, rig)
+    };
+    let (phase, mut rig) = first_fault(Unguarded::default());
+    assert_eq!(phase, Ok(Phase::Faulted(Fault::LeverSlips)));
+    assert_eq!(
+        rig.rest(|_| ()),
+        Err(SimError::Fault(Fault::LeverNotHome)),
+        "worse than the first"
+    );
+    assert!(rig.world().truth().force_n > 1.0 && rig.world().truth().speed_mm_s == 0.0);
+    let (phase, _) = first_fault(Unguarded::against(Fault::LeverSlips));
+    assert!(
+        phase.is_err(),
+        "without the guard it waits in Lifting: {phase:?}"
+    );
+}
+
+#[test]
+fn a_runaway_after_a_fault_finds_the_driver_off() {
+    let mut rig = pressed(Unguarded::default());
+    rig.world().inject(Cause::StageJammed);
+    assert!(rig.rest(|_| ()).is_err());
+    rig.world().inject(Cause::LeverRunaway);
+    rig.world().reset_extremes();
+    wait(&mut rig, 60_000);
+    assert_eq!(rig.world().truth().force_max_n, 0.0);
+    // and while parked, after the reset
+    rig.control().reset().unwrap();
+    rig.world().inject(Cause::LeverRunaway);
+    wait(&mut rig, 60_000);
+    assert_eq!(rig.world().truth().force_max_n, 0.0);
+}
+
+#[test]
+fn a_reset_or_a_stop_does_not_leave_the_finger_down() {
+    let mut rig = pressed(Unguarded::default());
+    rig.world().inject(Cause::StageJammed);
+    wait(&mut rig, 100);
+    assert_eq!(rig.control().reset(), Err(Refused::Busy), "still lifting");
+    assert!(rig.rest(|_| ()).is_err());
+    assert!(rig.world().truth().indentation_mm < -0.5);
+
+    // powered up with the finger on the sample: stopped while it looks for the limit switch
+    let mut rig = SimRig::new(Setup {
+        texture: 45,
+        ..Setup::default()
+    });
+    wait(&mut rig, 200);
+    rig.control().home().unwrap();
+    wait(&mut rig, 50);
+    rig.control().stop();
+    rig.rest(|_| ()).unwrap();
+    assert_eq!(rig.control().phase(), Phase::Parked);
+    assert!(
+        rig.world().lever_top(),
+        "the lever has gone on to its switch"
+    );
+}
+
+/// A switch that says "at the top" everywhere, and somebody who homes again and again: the lever must not take each place
+/// for a lower top, until its zero is taken under load.
+#[test]
+fn a_stuck_switch_and_a_stubborn_operator_do_not_let_the_lever_creep_down() {
+    let mut rig = pressed(Unguarded::default());
+    rig.world().inject(Cause::LeverTopStuck { closed: true });
+    for _ in 0..20 {
+        let _ = rig.rest(|_| ());
+        rig.control().reset().unwrap();
+        let _ = rig.control().home();
+        let _ = rig.rest(|_| ());
+        let _ = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+    }
+    let truth = rig.world().truth();
+    assert!(truth.force_max_n <= 2.2, "{} N", truth.force_max_n);
+    assert!(truth.indentation_mm < 0.0, "{} mm", truth.indentation_mm);
+}
+
+/// What makes the count of steps wrong, either way, and many times over: once it is repaired and homed, the rig presses as
+/// before.
+#[test]
+fn steps_that_were_lost_do_not_add_up() {
+    let causes = [
+        // up into the hard stop, by 10 s of steps
+        Cause::LeverTopStuck { closed: false },
+        // down, and nobody counts
+        Cause::LeverRunaway,
+        // fewer than were counted, most of them down
+        Cause::LeverLosesSteps { share: 0.9 },
+        // none at all: it never left the switch
+        Cause::LeverLosesSteps { share: 1.0 },
+    ];
+    causes.par_iter().for_each(|cause| {
+        let mut rig = pressed(Unguarded::default());
+        let _ = rig.rest(|_| ());
+        for round in 0..8 {
+            rig.home().unwrap();
+            rig.world().inject(*cause);
+            let _ = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+            let _ = rig.rest(|_| ());
+            // somebody tries before it is repaired
+            let _ = rig.control().reset();
+            let _ = rig.home();
+            rig.world().clear();
+            let _ = rig.control().reset();
+            let sound = rig
+                .home()
+                .and_then(|()| rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ()));
+            assert!(sound.is_ok(), "{cause:?}, round {round}: {sound:?}");
+        }
+    });
+}
+
+/// A force over the limit that lasts while the lever goes up, because somebody leans on it: it must go on, and it did not
+/// even begin where another fault had come first. One that rises while it goes up is the lever's own: it must stop.
+#[test]
+fn a_force_that_lasts_does_not_end_the_lifting() {
+    // counts of P_DC per ms of lifting
+    for (e_stop_first, rising, lifts) in [(false, 0, true), (true, 0, true), (false, 1, false)] {
+        let mut control = SimRig::new(Setup::default()).control().clone();
+        control.home().unwrap();
+        let mut steps = 0;
+        let mut lifted = 0;
+        for ms in 0..600_u16 {
+            let high = ms > 100;
+            let pdc = 2593 + if high { 190 + rising * (ms - 100) } else { 0 };
+            let word = |channel, counts| {
+                let counts = Counts::new(counts).unwrap();
+                Some(Pressure { channel, counts })
+            };
+            let mut inputs = Inputs {
+                steps,
+                e_stop: e_stop_first && ms > 20,
+                ..Inputs::default()
+            };
+            for n in 0..2 {
+                let words = [
+                    word(Channel::Pac, 2040 + (ms * 7 + n * 5) % 9),
+                    word(Channel::Pdc, pdc),
+                ];
+                inputs.words.extend(words);
+            }
+            let outputs = control.tick(&inputs);
+            if outputs.lever_enabled {
+                steps += outputs.lever_steps_s / 1000;
+                lifted += i32::from(ms > 200 && outputs.lever_steps_s < 0);
+            }
+        }
+        assert_eq!(control.phase(), Phase::Faulted(Fault::ForceHigh));
+        assert_eq!(lifted > 390, lifts, "{lifted} ms, rising {rising}");
+        assert_eq!(lifted == 0, !lifts, "{lifted} ms, rising {rising}");
+    }
+}
+
+/// The chip starts again, wherever lever and stage are.
+fn reboot(rig: &mut SimRig, calibration: RigCalibration, unguarded: Unguarded) {
+    *rig.control() = Control::new(
+        &BioTac::MODEL,
+        StageConstants::REFERENCE,
+        calibration,
+        unguarded,
+    );
+}
+
+/// The wire of the lever's switch breaks, and the chip starts again while the finger presses: to the firmware it is at the
+/// top. Only P_DC says that it is not, to a rig that knows what its finger says in the air.
+#[test]
+fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
+    let booted = |unguarded, like_the_firmware: bool| {
+        let mut rig = SimRig::new(Setup {
+            texture: 45,
+            ..Setup::default()
+        });
+        rig.home().unwrap();
+        let calibration = rig.calibrate(20_261_121).unwrap();
+        rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
+        until(&mut rig, "sliding", |rig| {
+            rig.control().phase() == Phase::Sliding
+        })
+        .unwrap();
+        rig.world().inject(Cause::LeverTopStuck { closed: true });
+        if like_the_firmware {
+            // it lifts the finger, then reads its calibration
+            let unmeasured = RigCalibration {
+                pressure: Calibration::PAPER,
+                air_known: false,
+                turned: 0,
+                ..calibration
+            };
+            reboot(&mut rig, unmeasured, unguarded);
+            wait(&mut rig, 200);
+            rig.control().home().unwrap();
+            rig.control().stop();
+            rig.rest(|_| ()).unwrap();
+            rig.control().calibrate(calibration).unwrap();
+        } else {
+            reboot(&mut rig, calibration, unguarded);
+            wait(&mut rig, 200);
+        }
+        let pressed = rig.world().truth();
+        assert!(pressed.force_n > 0.6, "{pressed:?}");
+        rig.world().reset_extremes();
+        let mut first = None;
+        // with the operator who tries again
+        for _ in 0..3 {
+            let _ = rig.control().reset();
+            let _ = rig.control().home();
+            let homed = rig.rest(|_| ());
+            first.get_or_insert(homed);
+            let _ = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+        }
+        let truth = rig.world().truth();
+        let dragged_mm = truth.stage_reach_mm.1 - truth.stage_reach_mm.0;
+        println!(
+            "{:.2} N at boot, then {:.2} N at most, {dragged_mm:.1} mm: {first:?}",
+            pressed.force_n, truth.force_max_n
+        );
+        (rig, calibration, first, dragged_mm)
+    };
+    for like_the_firmware in [false, true] {
+        let (mut rig, calibration, first, dragged_mm) =
+            booted(Unguarded::default(), like_the_firmware);
+        let not_home = Err(SimError::Fault(Fault::LeverNotHome));
+        assert_eq!(first, Some(not_home));
+        let truth = rig.world().truth();
+        assert!(
+            truth.force_max_n < 1.3 && dragged_mm < 0.1,
+            "{dragged_mm} mm {truth:?}"
+        );
+        // the wire is mended
+        rig.world().clear();
+        rig.control().reset().unwrap();
+        rig.home().unwrap();
+        let slid = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+        assert_eq!(slid, Ok(Ended::Whole));
+        assert_eq!(rig.control().calibration(), &calibration);
+        // and without the guards of the zero it does harm
+        let unguarded = Unguarded::against(Fault::LeverNotHome).and(Fault::Unsteady);
+        let (mut rig, _, _, dragged_mm) = booted(unguarded, like_the_firmware);
+        let truth = rig.world().truth();
+        assert!(truth.force_max_n > 2.2 && dragged_mm > 10.0, "{truth:?}");
+    }
+}
+
+/// A finger whose P_DC drifts away after homing and before the first zero.
+#[test]
+fn the_first_zero_is_that_of_the_calibration() {
+    let unwatched = Unguarded::against(Fault::LeverNotHome);
+    for (counts_per_s, unguarded, slides) in [
+        (0.0, Unguarded::default(), true),
+        (30.0, Unguarded::default(), false),
+        (-30.0, Unguarded::default(), false),
+        (3.0, Unguarded::default(), true),
+        (-30.0, unwatched, true),
+    ] {
+        let mut rig = SimRig::new(Setup::default());
+        rig.home().unwrap();
+        let calibration = rig.calibrate(20_261_121).unwrap();
+        reboot(&mut rig, calibration, unguarded);
+        rig.home().unwrap();
+        rig.world().inject(Cause::PdcDrift { counts_per_s });
+        wait(&mut rig, 1500);
+        rig.world().reset_extremes();
+        let slid = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
+        let faults = [Fault::LeverNotHome, Fault::ForceHigh];
+        let seen =
+            |fault: Fault| slid == Err(fault.into()) || slid == Err(Refused::Fault(fault).into());
+        // one that rises is seen before, while the rig waits
+        let fault = faults.into_iter().find(|fault| seen(*fault));
+        assert_eq!(fault.is_none(), slides, "{counts_per_s} counts/s: {slid:?}");
+        if !slides {
+            assert_eq!(rig.world().truth().force_max_n, 0.0);
+        }
+    }
+}
+
+/// What nobody has calibrated yet, of a finger that says 240 counts more in the air than the default.
+fn far_off_default(rig: &mut SimRig) -> RigCalibration {
+    let unmeasured = *rig.control().calibration();
+    assert!(!unmeasured.air_known);
+    RigCalibration {
+        pressure: Calibration {
+            pdc_no_contact: 2400.0,
+            ..unmeasured.pressure
+        },
+        ..unmeasured
+    }
+}
+
+#[test]
+fn a_finger_far_from_the_default_can_be_homed_and_calibrated() {
+    let mut rig = SimRig::new(Setup::default());
+    let calibration = far_off_default(&mut rig);
+    reboot(&mut rig, calibration, Unguarded::default());
+    rig.home().unwrap();
+    let measured = rig.calibrate(20_261_121).unwrap();
+    assert!(measured.pressure.pdc_no_contact > 2580.0, "{measured:?}");
+    // taken into use while nothing moves, and by a rig that starts with it
+    rig.control().calibrate(calibration).unwrap();
+    wait(&mut rig, 100);
+    assert_eq!(rig.control().phase(), Phase::Ready);
+    rig.control().calibrate(measured).unwrap();
+    wait(&mut rig, 100);
+    let slid = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
+    assert_eq!(slid, Ok(Ended::Whole));
+    reboot(&mut rig, measured, Unguarded::default());
+    rig.home().unwrap();
+}
+
+/// Before there is a zero the force is what P_DC has risen by. A finger that is down when the chip starts must not be the
+/// measure of that once it is lifted.
+#[test]
+fn a_finger_that_nobody_calibrated_is_guarded_before_its_first_zero() {
+    let pressed_by_a_runaway = |down_at_boot: bool, unguarded| {
+        let mut rig = SimRig::unguarded(
+            Setup {
+                texture: 45,
+                ..Setup::default()
+            },
+            unguarded,
+        );
+        let calibration = far_off_default(&mut rig);
+        rig.home().unwrap();
+        if down_at_boot {
+            rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
+            until(&mut rig, "sliding", |rig| {
+                rig.control().phase() == Phase::Sliding
+            })
+            .unwrap();
+        }
+        reboot(&mut rig, calibration, unguarded);
+        rig.control().home().unwrap();
+        rig.rest(|_| ()).unwrap();
+        assert_eq!(rig.world().truth().force_n, 0.0);
+        rig.world().reset_extremes();
+        rig.world().inject(Cause::LeverRunaway);
+        wait(&mut rig, 40_000);
+        let force_max_n = rig.world().truth().force_max_n;
+        println!("down at boot {down_at_boot}: {force_max_n:.2} N");
+        (force_max_n, rig.control().phase())
+    };
+    for down_at_boot in [false, true] {
+        // nobody looks at the lever's switch
+        let blind = Unguarded::against(Fault::LeverNotHome);
+        let (force_max_n, phase) = pressed_by_a_runaway(down_at_boot, blind);
+        // 40 counts are 0.46 N
+        assert!((0.4..0.8).contains(&force_max_n), "{force_max_n} N");
+        assert_eq!(phase, Phase::Faulted(Fault::ForceHigh));
+        let (force_max_n, _) = pressed_by_a_runaway(down_at_boot, blind.and(Fault::ForceHigh));
+        assert!(force_max_n > 2.2, "{force_max_n} N");
+        let (force_max_n, phase) = pressed_by_a_runaway(down_at_boot, Unguarded::default());
+        assert_eq!(force_max_n, 0.0);
+        assert_eq!(phase, Phase::Faulted(Fault::LeverNotHome));
+    }
+}
+
+/// A movement that does not come to an end: before anybody says so the finger is lifted.
+#[test]
+fn a_rig_that_hangs_lifts_its_finger_before_it_says_so() {
+    let unguarded = Unguarded::against(Fault::Unsteady).and(Fault::PressureDead);
+    let mut rig = SimRig::unguarded(Setup::default(), unguarded.and(Fault::LeverSlips));
+    rig.home().unwrap();
+    rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
+    until(&mut rig, "touching", |rig| {
+        rig.world().truth().force_n > 0.9
+    })
+    .unwrap();
+    rig.world().inject(Cause::PdcDrift {
+        counts_per_s: -20.0,
+    });
+    let ended = rig.rest(|_| ());
+    assert!(matches!(ended, Err(SimError::Hangs(_))), "{ended:?}");
+    let truth = rig.world().truth();
+    assert!(
+        truth.force_n == 0.0 && truth.indentation_mm < -0.5,
+        "{truth:?}"
+    );
+}
+
+/// A rig that has slid, and now waits.
+fn slid(seed: u64) -> SimRig {
+    let mut rig = SimRig::new(Setup {
+        texture: 1 + draw(seed, 117) as u8,
+        trial_seed: seed,
+        finger_seed: 1 + seed % 5,
+        ..Setup::default()
+    });
+    rig.home().unwrap();
+    let ended = rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ());
+    assert_eq!(ended, Ok(Ended::Whole));
+    rig.world().reset_extremes();
+    rig
+}
+
+/// Its switch bounces, the stage shakes it, and the motors lose their supply: none of that is a lever that comes down.
+#[test]
+fn a_finger_that_waits_over_its_sample_goes_up_to_its_switch() {
+    let parked: usize = (0..60u32)
+        .into_par_iter()
+        .map(|seed| {
+            let mut rig = slid(u64::from(seed));
+            rig.world().inject(Cause::SwitchesBounce { ms: 50 });
+            rig.world().inject(Cause::StageVibrates { um: 3.0 });
+            // some are asked again on their way up
+            wait(&mut rig, 1_000 + 200 * seed);
+            let is_parked = rig.world().lever_top();
+            if seed % 3 == 0 {
+                wait(&mut rig, 10_000);
+                assert!(rig.world().lever_top(), "{seed}");
+                rig.world().inject(Cause::SupplyDip {
+                    ms: u64::from(3 * seed),
+                });
+                wait(&mut rig, 60_000);
+            }
+            assert_eq!(rig.control().phase(), Phase::Ready, "{seed}");
+            assert_eq!(rig.world().truth().force_max_n, 0.0, "{seed}");
+            for _ in 0..2 {
+                let ended = rig.slide(Movement::FOR_TRACTION, 0.5, |_, _| ());
+                assert_eq!(ended, Ok(Ended::Whole), "{seed}");
+            }
+            usize::from(is_parked)
+        })
+        .sum();
+    assert!((10..50).contains(&parked), "{parked} of 60 were parked");
+}
+
+/// From any moment of its waiting: over the sample the lever goes up in time, and its switch sees it later.
+#[test]
+fn a_runaway_under_a_waiting_finger_without_a_pressure_does_not_touch() {
+    (0..60u32).into_par_iter().for_each(|seed| {
+        let mut rig = slid(u64::from(seed));
+        rig.world().inject(Cause::PdcStuck);
+        wait(&mut rig, 200 * seed);
+        let was_parked = rig.world().lever_top();
+        rig.world().inject(Cause::LeverRunaway);
+        wait(&mut rig, 60_000);
+        let (truth, phase) = (rig.world().truth(), rig.control().phase());
+        assert_eq!(truth.force_max_n, 0.0, "{seed}: {phase:?}");
+        let seen = phase == Phase::Faulted(Fault::LeverNotHome);
+        assert!(
+            seen || (!was_parked && phase == Phase::Ready),
+            "{seed}: {phase:?}"
+        );
+        assert!(seen || rig.world().lever_top(), "{seed}");
+    });
+}
+
+#[test]
+fn a_rig_may_idle_for_an_hour() {
+    let mut rig = SimRig::new(Setup::default());
+    rig.home().unwrap();
+    wait(&mut rig, 3_600_000);
+    rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
+}
+
+/// One movement by the world's own reckoning: how it ended, and the mean force of the still finger and of the slide, N. A
+/// lever that runs down does so from this ms of the slide on.
+fn forces_of(
+    rig: &mut SimRig,
+    movement: Movement,
+    runs_down_at: Option<u64>,
+) -> (Result<(), Fault>, [f64; 2]) {
+    rig.control().start(movement, 0.3).unwrap();
+    let mut forces = [(0.0, 0u32); 2];
+    let mut slid = 0;
+    let ended = loop {
+        rig.tick();
+        let force_n = rig.world().truth().force_n;
+        let of = match rig.control().phase() {
+            Phase::Background => &mut forces[0],
+            Phase::Sliding => {
+                if runs_down_at == Some(slid) {
+                    rig.world().inject(Cause::LeverRunaway);
+                }
+                slid += 1;
+                &mut forces[1]
+            }
+            Phase::Faulted(fault) => break Err(fault),
+            Phase::Lifting => break Ok(()),
+            _ => continue,
+        };
+        *of = (of.0 + force_n, of.1 + 1);
+    };
+    (ended, forces.map(|(sum, n)| sum / f64::from(n.max(1))))
+}
+
+const MOVEMENTS: [Movement; 3] = [
+    Movement::FOR_TRACTION,
+    Movement::FOR_FINENESS,
+    Movement::FOR_ROUGHNESS,
+];
+
+/// The rig takes 3 counts and a quarter; a sound slide stays at half of that, of every texture that is tried.
+#[test]
+fn the_force_of_a_sound_slide_is_that_of_the_still_finger() {
+    let mut farthest = 0.0_f64;
+    for seed in 0..50 {
+        let mut rig = SimRig::new(Setup {
+            texture: 1 + draw(seed, 117) as u8,
+            trial_seed: seed,
+            finger_seed: 1 + seed % 5,
+            ..Setup::default()
+        });
+        rig.home().unwrap();
+        let movement = MOVEMENTS[seed as usize % 3];
+        let (ended, [still, slide]) = forces_of(&mut rig, movement, None);
+        assert_eq!(ended, Ok(()), "seed {seed}");
+        let allowed = 3.0 * 0.0115 + 0.25 * still;
+        farthest = farthest.max((slide - still).abs() / allowed);
+        assert!(farthest < 0.5, "seed {seed}: {still:.3} and {slide:.3} N");
+    }
+    println!("at most {:.0} % of what is allowed", 100.0 * farthest);
+}
+
+/// A driver that steps down by itself, even in a slide of one second: what counts was made with the force that was asked for.
+#[test]
+fn a_slide_during_which_the_lever_runs_down_does_not_count() {
+    let slides = |unguarded: Unguarded| {
+        let (mut counted, mut off) = (0, 0);
+        for seed in 0..60 {
+            let setup = Setup {
+                texture: 1 + draw(seed, 117) as u8,
+                trial_seed: seed,
+                finger_seed: 1 + seed % 5,
+                ..Setup::default()
+            };
+            let mut rig = SimRig::unguarded(setup, unguarded);
+            rig.home().unwrap();
+            let movement = MOVEMENTS[seed as usize % 3];
+            let (ended, [still, slide]) = forces_of(&mut rig, movement, Some(draw(seed, 900)));
+            let truth = rig.world().truth().force_max_n;
+            assert!(truth < 2.2, "seed {seed}: {truth} N");
+            // P_DC knows the force to 5 % and a count
+            let allowed = 4.0 * 0.0115 + 0.3 * still;
+            counted += u32::from(ended.is_ok());
+            off += u32::from(ended.is_ok() && (slide - still).abs() > allowed);
+        }
+        (counted, off)
+    };
+    let (counted, off) = slides(Unguarded::default());
+    println!("{counted} of 60 slides counted, {off} of them with another force");
+    assert_eq!(off, 0);
+    let (_, off) = slides(Unguarded::against(Fault::Unsteady));
+    assert!(off > 0, "without the check no slide has another force");
+}

@@ -1,0 +1,25 @@
+//! Tests of core and lab across the crates: golden values, reference figures, faults, explorations.
+
+mod arm;
+mod confusions;
+mod crush;
+mod early;
+mod fabricslide;
+mod fault_cases;
+mod faults;
+mod figures;
+mod fixed_point;
+mod fused_recipe;
+mod golden;
+mod high_force;
+mod objective;
+mod oracle;
+mod pace;
+mod page;
+mod played;
+mod presses;
+mod recordings;
+mod refresh;
+mod same;
+mod simulated_rig;
+mod training;
