@@ -11,8 +11,8 @@ mod session;
 mod slides;
 mod standing;
 
-pub use hearing::{Heard, Hearing, spectra};
-pub use message::{Expected, Frame, Happening, Known, Measured, Reply, Request, Settings};
+pub use hearing::{Hearing, Received, spectra};
+pub use message::{Expected, Frame, Happening, KnownTable, Measured, Reply, Request, Settings};
 pub use session::{Session, sentence};
 pub use slides::{TRIALS, Trials, WORLD, WorldError, bring_world, world_table};
 pub use standing::Standing;

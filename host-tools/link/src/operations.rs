@@ -124,7 +124,7 @@ pub enum Sample {
     /// Whoever is there is asked to move it.
     Asked,
     /// It is moved, or stays where it is; or nobody knows.
-    Told(Option<bool>),
+    Noted(Option<bool>),
 }
 
 /// A training.
@@ -215,7 +215,7 @@ pub async fn train(probe: &Probe, training: &Training) -> Result<Learned> {
     writeln!(words, "{name}: {} made.", say::count(slides, "slide"))?;
     let mut not_noted = None;
     if slides > 0 {
-        if let Sample::Told(moved) = training.sample {
+        if let Sample::Noted(moved) = training.sample {
             samples.said(moved);
         }
         // one trial is moved from nowhere

@@ -5,6 +5,9 @@ use std::error::Error;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
+use tactus_core::explorer::{ExplorerError, ObserveError};
+use tactus_core::features::{MovementError, SlideError as OfSlide};
+use tactus_core::table::TableError as OfTable;
 use tactus_lab::data::properties::PropertyError;
 use tactus_lab::data::recordings::RecordingError as OfRecordings;
 use tactus_lab::data::replay::MeasureError;
@@ -14,14 +17,11 @@ use tactus_lab::eval::experiment::ExperimentError;
 use tactus_lab::eval::first::FirstError;
 use tactus_lab::eval::learn::TableError as LearnError;
 use tactus_lab::eval::verify::VerifyError;
+use tactus_lab::sim::collection::TrialError;
+use tactus_lab::sim::rig::SimError;
 use tactus_link::line::LineError;
 use tactus_link::log::LogError;
 use tactus_link::{LinkError, OperationError};
-use tactus_lab::sim::collection::TrialError;
-use tactus_lab::sim::rig::SimError;
-use tactus_core::explorer::{ExplorerError, ObserveError};
-use tactus_core::features::{MovementError, SlideError as OfSlide};
-use tactus_core::table::TableError as OfTable;
 
 create_exception!(
     tactus,

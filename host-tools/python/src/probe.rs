@@ -11,6 +11,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tactus_core::table::{Name, Table as Read};
+use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
+use tactus_lab::remote::operations::{Wanted, record};
 use tactus_link::lifting::Stopped;
 use tactus_link::line::{Line, found, only_nucleo, open};
 use tactus_link::lock::PortLock;
@@ -18,9 +21,6 @@ use tactus_link::log::{self, Log};
 use tactus_link::operations::{self, Sample};
 use tactus_link::{OperationError, Port, PortError, PushTable, Request, Transaction};
 use tactus_link::{Probe as Linked, say};
-use tactus_lab::remote::operations::{Wanted, record};
-use tactus_core::table::{Name, Table as Read};
-use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
 
 use crate::arguments;
 use crate::error::{ProbeError, Raise as _};
@@ -429,7 +429,7 @@ impl Probe {
             name: texture,
             index: 0,
             slides,
-            sample: Sample::Told(None),
+            sample: Sample::Noted(None),
             seed: seed.unwrap_or_else(seed_of_now),
         };
         let recorded = self.complete(py, record(&self.linked, &wanted))?;

@@ -5,8 +5,8 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use tactus_link::{Port, Probe};
 use tactus_core::table::Table;
+use tactus_link::{Port, Probe};
 
 use crate::common::elf;
 

@@ -8,7 +8,7 @@ use tactus_core::features::{BLOCK, Block, Observation};
 use tactus_core::table::Table;
 use tactus_core::wire::{self, Event};
 
-use super::message::{Expected, Happening, Known, Measured, name};
+use super::message::{Expected, Happening, KnownTable, Measured, name};
 use super::standing::{Followed, PLAN, Standing};
 use crate::eval::places::{Plane, distances, slide_distances};
 use crate::eval::transcript::Answer;
@@ -21,7 +21,7 @@ const BINS: usize = 4;
 
 /// What has come since it was taken last.
 #[derive(Default)]
-pub struct Heard {
+pub struct Received {
     /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
     pub pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
@@ -36,12 +36,12 @@ pub struct Hearing {
     /// The table in force, and its maps.
     table: Rc<[u8]>,
     planes: Vec<Plane>,
-    known: Known,
+    known: KnownTable,
     followed: Followed,
     early_ms: Option<u16>,
     /// The last samples of P_AC.
     recent: Vec<i16>,
-    heard: Heard,
+    heard: Received,
 }
 
 impl Hearing {
@@ -67,7 +67,7 @@ impl Hearing {
                 None => plane,
             });
         }
-        self.known = Known {
+        self.known = KnownTable {
             textures: table.names().map(str::to_owned).collect(),
             numbers: table.names().map(texture_number).collect(),
             movements: table
@@ -82,7 +82,7 @@ impl Hearing {
     }
 
     /// What the probe knows.
-    pub fn known(&self) -> &Known {
+    pub fn known(&self) -> &KnownTable {
         &self.known
     }
 
@@ -104,7 +104,7 @@ impl Hearing {
     }
 
     /// What has been since the last time.
-    pub fn take(&mut self) -> Heard {
+    pub fn take(&mut self) -> Received {
         std::mem::take(&mut self.heard)
     }
 
@@ -210,7 +210,7 @@ impl Hearing {
                     name: name.to_string(),
                     slides,
                     // the table is another one when the request is over: see `Session`
-                    known: Known::default(),
+                    known: KnownTable::default(),
                 })
             }
             Event::Done(_) => Some(Happening::Done),
@@ -228,7 +228,7 @@ impl Hearing {
     }
 }
 
-/// The spectra of samples from their first on, as those of [`Heard`].
+/// The spectra of samples from their first on, as those of [`Received`].
 pub fn spectra(pac: &[i16]) -> Vec<Vec<i8>> {
     let ends = (1..=pac.len() / BLOCK).map(|block| block * BLOCK);
     let before = |end: usize| pac.get(end.saturating_sub(FRAME)..end);

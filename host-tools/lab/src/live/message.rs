@@ -95,7 +95,7 @@ pub enum Reply {
         of: usize,
     },
     /// The probe waits for requests.
-    Ready(Known),
+    Ready(KnownTable),
     /// What has been since the last one.
     Frame(Frame),
     /// The request makes no sense, and why.
@@ -107,7 +107,7 @@ pub enum Reply {
 
 /// What the probe knows.
 #[derive(Clone, PartialEq, Debug, Serialize, Default)]
-pub struct Known {
+pub struct KnownTable {
     /// Names of its textures, in the order of the table.
     pub textures: Vec<String>,
     /// Their numbers in Table 1; `None` for one that was taught under a name that is not there.
@@ -230,7 +230,7 @@ pub enum Happening {
         /// From so many slides.
         slides: u8,
         /// The table.
-        known: Known,
+        known: KnownTable,
     },
     /// A verification has judged a slide.
     Judged {

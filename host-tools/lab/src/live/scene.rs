@@ -7,7 +7,7 @@ use tactus_core::probe::RigState;
 use tactus_core::rig::{Phase, RigError};
 use tactus_core::wire::Event;
 
-use super::hearing::{Heard, Hearing};
+use super::hearing::{Hearing, Received};
 use super::message::{Frame, Happening};
 use crate::sim::probe::Host;
 use crate::sim::rig::SimRig;
@@ -85,7 +85,7 @@ impl Scene {
             wear,
             ..
         } = self.truth;
-        let Heard {
+        let Received {
             pac,
             spectra,
             happened,

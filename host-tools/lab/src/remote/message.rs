@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use tactus_core::wire::Phase;
 
-use crate::live::{Happening, Known};
+use crate::live::{Happening, KnownTable};
 
 /// What is asked for.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
@@ -198,9 +198,9 @@ pub struct Frame {
     /// What the probe said.
     pub happened: Vec<Happening>,
     /// What it knows, where that has become something else.
-    pub known: Option<Known>,
+    pub known: Option<KnownTable>,
     /// In a log: what it knew from each of these places in `happened` on.
-    pub tables: Vec<(usize, Known)>,
+    pub tables: Vec<(usize, KnownTable)>,
     /// What `tactus device` prints.
     pub said: String,
     /// What went wrong, and what to do.

@@ -146,7 +146,7 @@ pub async fn record(probe: &Probe, wanted: &Wanted<'_>) -> Result<Recorded> {
     // a slide of each movement, then the sample is moved
     let part = match wanted.sample {
         Sample::Asked => Table::read(&probe.table().await?)?.movements().len() as u8,
-        Sample::Told(_) => slides,
+        Sample::Noted(_) => slides,
     };
     probe.get(Request::command(Command::Stream(true))).await?;
     let mut recorder = Recorder::new(calibration.pressure);
@@ -184,7 +184,7 @@ pub async fn record(probe: &Probe, wanted: &Wanted<'_>) -> Result<Recorded> {
     let slides = kept.into_iter().map(|(trial, slide)| {
         let moved = match wanted.sample {
             Sample::Asked => samples.before_trial(trial),
-            Sample::Told(moved) => moved,
+            Sample::Noted(moved) => moved,
         };
         (slide, moved)
     });

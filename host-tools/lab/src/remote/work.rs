@@ -28,7 +28,7 @@ fn name_of(name: &str) -> Result<Name> {
 }
 
 fn sample(moved: Option<bool>) -> Sample {
-    moved.map_or(Sample::Asked, |moved| Sample::Told(Some(moved)))
+    moved.map_or(Sample::Asked, |moved| Sample::Noted(Some(moved)))
 }
 
 /// Does what is asked for; then the page knows the table in use.

@@ -5,13 +5,13 @@ use tactus_core::wire::bringup::{
     Look, MAX_POINTS, Measure, POINTS, Pin, Saw, SensorSeen, Stopped, limits,
 };
 
-use super::found::{Found, Series};
 use super::judge::mounted::{AIR_COUNTS, OFF_LINE, SPEED_SHARE, UNEVEN_MM};
 use super::judge::{
     self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
     TRAVEL_MM, Went,
 };
 use super::mounted::Mounted;
+use super::result::{Series, StepResult};
 use super::seams::{Board, Person, Trouble};
 
 /// A step.
@@ -29,8 +29,8 @@ pub struct Step {
 
 /// What is done, and the image that it takes.
 pub(super) enum Run {
-    SelfTest(fn(&mut Bench<'_>) -> Result<Found, Trouble>),
-    Rig(fn(&mut Mounted<'_>) -> Result<Found, Trouble>),
+    SelfTest(fn(&mut Bench<'_>) -> Result<StepResult, Trouble>),
+    Rig(fn(&mut Mounted<'_>) -> Result<StepResult, Trouble>),
 }
 
 impl Step {
@@ -158,7 +158,7 @@ pub static STEPS: &[Step] = &[
                 .iter()
                 .zip(0..)
                 .map(|(point, at)| [f64::from(at) / 2.2, point[0]]);
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::noise(&seen),
                 series: Some(Series {
                     title: "P_AC of the finger that nobody touches",
@@ -278,7 +278,7 @@ pub static STEPS: &[Step] = &[
             let mut points = bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?;
             let back = bench.lever(Measure::LeverTop)?;
             points.extend(bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?);
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::lever_switch(&up, &down, &back),
                 series: Some(Series {
                     title: "P_DC above its rest while the lever goes 2 mm down and up, the finger off",
@@ -350,7 +350,7 @@ pub static STEPS: &[Step] = &[
             let right = ask_stage(bench, true)?;
             let points = bench.points(1e-3, 1.0)?;
             let left = ask_stage(bench, false)?;
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::bridge(&right, &left),
                 series: Some(Series {
                     title: "the motor's current while the stage goes to the right",
@@ -384,7 +384,7 @@ pub static STEPS: &[Step] = &[
             for point in &mut points {
                 point[0] *= 1e-3;
             }
-            Ok(Found {
+            Ok(StepResult {
                 finding,
                 series: Some(Series {
                     title: "current of the resistor by the bridge's duty",
@@ -442,7 +442,7 @@ pub static STEPS: &[Step] = &[
             let [last, _] = bench.sensor()?.pdc;
             bench.person.done("Take the weight away")?;
             let [after, _] = bench.sensor()?.pdc;
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::mounted::scale(&points, last - first, after - air),
                 series: Some(Series {
                     title: SCALE,

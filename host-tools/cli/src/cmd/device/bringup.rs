@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
-use tactus_core::wire::{Command, Report as Told, Reset};
+use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_link::Request;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, Owner, Person, Probe, Report, STEPS,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, STEPS,
     Step, Trouble, judge,
 };
 
@@ -127,7 +127,7 @@ impl Probe for Linked {
     fn ask(
         &mut self,
         command: Command,
-        each: &mut dyn FnMut(&Told),
+        each: &mut dyn FnMut(&ProbeReport),
     ) -> Result<Result<(), String>, Trouble> {
         let probe = self.0.probe();
         let done = probe.run(Request::command(command), |report| {
@@ -341,7 +341,7 @@ impl Person for Terminal {
     }
 }
 
-impl Owner for Terminal {
+impl Operator for Terminal {
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
         let verdict = if entry.passed { "passed" } else { "FAILED" };
         eprintln!("{verdict}  {}: {}", step.checks, entry.saw);

@@ -25,7 +25,7 @@ impl Sample {
     pub(crate) fn known(self) -> operations::Sample {
         match self.said() {
             None if std::io::stdin().is_terminal() => operations::Sample::Asked,
-            said => operations::Sample::Told(said),
+            said => operations::Sample::Noted(said),
         }
     }
 }
