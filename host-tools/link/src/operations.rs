@@ -8,7 +8,7 @@ use std::io::{self, Write as _};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::probe::training::pilot_movements;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::most_mn;
@@ -94,8 +94,14 @@ pub struct Learned {
     pub table: Arc<[u8]>,
 }
 
+/// The name of a texture as the probe keeps it.
+fn name_of(name: &str) -> Result<Name> {
+    say::name_of(name).map_err(OperationError::said)
+}
+
 /// Names the texture of the last exploration; the probe learns it.
-pub async fn teach(probe: &Probe, name: Name) -> Result<Learned> {
+pub async fn teach(probe: &Probe, name: &str) -> Result<Learned> {
+    let name = name_of(name)?;
     let before = probe.table().await?;
     let taught = probe.get(Request::label(name)).await?;
     let slides = say::count(taught.slides, "slide");
@@ -119,26 +125,36 @@ async fn learned(probe: &Probe, name: &str, slides: u32, before: &[u8]) -> Resul
 }
 
 /// What is known of a sample between trials.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Deserialize)]
+#[serde(from = "Option<bool>")]
 pub enum Sample {
     /// Whoever is there is asked to move it.
+    #[default]
     Asked,
     /// It is moved, or stays where it is; or nobody knows.
     Noted(Option<bool>),
 }
 
+impl From<Option<bool>> for Sample {
+    fn from(moved: Option<bool>) -> Self {
+        moved.map_or(Self::Asked, |moved| Self::Noted(Some(moved)))
+    }
+}
+
 /// A training.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug, Deserialize)]
 pub struct Training {
     /// The texture.
-    pub name: Name,
+    pub name: String,
     /// Trials of each movement, those of an unfinished training included.
     pub trials: u8,
     /// Make all movements of the grid instead of the table's.
+    #[serde(default)]
     pub pilot: bool,
     /// For where on the sample slides begin.
     pub seed: u32,
     /// What is known of the sample.
+    #[serde(default, rename = "moved")]
     pub sample: Sample,
 }
 
@@ -164,7 +180,7 @@ pub async fn ask_to_lay(probe: &Probe, name: &str, kind: QuestionKind) -> Result
 
 /// Has the probe make slides of a texture and learn it.
 pub async fn train(probe: &Probe, training: &Training) -> Result<Learned> {
-    let Training { name, trials, .. } = training;
+    let (name, trials) = (&name_of(&training.name)?, &training.trials);
     let before = probe.table().await?;
     let table = Table::read(&before)?;
     let movements = match training.pilot {

@@ -45,6 +45,8 @@ impl<S: Read + Write> Port<S> {
     /// Polls an operation once, sends what is due, and reads once unless it is over.
     pub fn poll<F: Future + ?Sized>(&mut self, operation: Pin<&mut F>) -> Poll<F::Output> {
         let mut context = Context::from_waker(Waker::noop());
+        // somebody may have thought about a question since the last time
+        self.probe.carry(&[], self.began.elapsed());
         let polled = operation.poll(&mut context);
         self.turn(polled.is_pending());
         polled

@@ -34,7 +34,7 @@ const BOOTING: Duration = Duration::from_secs(90);
 /// Time between two questions to a probe that boots.
 const BETWEEN: Duration = Duration::from_millis(100);
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct State {
     name: String,
     session: Session,
@@ -218,26 +218,9 @@ impl Probe {
     pub fn new(name: &str, greeting: Duration, timeout: Duration) -> Self {
         let state = State {
             name: name.to_owned(),
-            session: Session::default(),
             greeting,
             timeout,
-            send: Vec::new(),
-            received: Vec::new(),
-            came: (0, 0),
-            now: Duration::ZERO,
-            heard: Duration::ZERO,
-            closed: false,
-            failure: None,
-            rig: RigWatch::default(),
-            said: Vec::new(),
-            stop: false,
-            lifting: false,
-            gives_up: false,
-            question: None,
-            answer: None,
-            backup: None,
-            kept: None,
-            table: None,
+            ..State::default()
         };
         Self {
             state: Arc::new(Mutex::new(state)),

@@ -44,9 +44,6 @@ pub struct Prompts(Option<Prompt>);
 
 impl Prompts {
     /// Prints what the person is asked to do, or a fault and its recovery, if the report is one of these.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn show(&mut self, report: &Report, out: &mut impl Write) -> io::Result<()> {
         match &report.event {
             Event::Prompt(prompt) if self.0.replace(*prompt) != Some(*prompt) => {
@@ -186,9 +183,6 @@ the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 
 pub const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
 
 /// Prints the probe's settings.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_settings(settings: &Settings, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
@@ -303,9 +297,6 @@ pub fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)> {
 }
 
 /// Prints values, each after its name.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_rows(rows: &[(&str, String)], out: &mut impl Write) -> io::Result<()> {
     rows.iter()
         .try_for_each(|(name, value)| writeln!(out, "{name:<15} {value}"))
@@ -330,9 +321,6 @@ pub fn sensor(c: &RigCalibration) -> Option<String> {
 }
 
 /// Prints what follows an exploration: what the probe learned, what it asks, and the frames and reports that were damaged or lost.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_identified(
     identified: &Identified,
     (damaged, missing): (u64, u64),
@@ -363,9 +351,6 @@ pub fn show_identified(
 }
 
 /// Prints what a training shows of a report.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_training(
     report: &Report,
     prompts: &mut Prompts,
@@ -393,9 +378,6 @@ pub fn show_training(
 }
 
 /// Prints what a verification shows of a report that judges no slide.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_verifying(
     report: &Report,
     prompts: &mut Prompts,

@@ -426,7 +426,7 @@ impl Probe {
         seed: Option<u32>,
     ) -> PyResult<Vec<Slide>> {
         let wanted = Wanted {
-            name: texture,
+            name: texture.to_owned(),
             index: 0,
             slides,
             sample: Sample::Noted(None),

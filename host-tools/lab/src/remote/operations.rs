@@ -3,9 +3,9 @@
 
 use std::io::{self, Write as _};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_core::explorer::{Strategy, Verdict};
-use tactus_core::table::{Contents, Name, Table};
+use tactus_core::table::{Contents, Table};
 use tactus_core::wire::{Command, Event, Identify, Report, Status};
 
 use super::say::compare;
@@ -54,7 +54,7 @@ pub async fn identify(
 }
 
 /// Names the texture of the last exploration, and compares it with the others.
-pub async fn teach(probe: &Probe, name: Name) -> Result<(Learned, Option<Alike>)> {
+pub async fn teach(probe: &Probe, name: &str) -> Result<(Learned, Option<Alike>)> {
     compared(probe, operations::teach(probe, name).await?)
 }
 
@@ -97,15 +97,17 @@ pub async fn verify(probe: &Probe, texture: u16, wanted: Identify) -> Result<Ver
 }
 
 /// A recording to be made.
-#[derive(Clone, Debug)]
-pub struct Wanted<'n> {
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+pub struct Wanted {
     /// The texture.
-    pub name: &'n str,
+    pub name: String,
     /// Its index in the recordings.
+    #[serde(default)]
     pub index: usize,
     /// Slides.
     pub slides: u8,
     /// What is known of the sample.
+    #[serde(default, rename = "moved")]
     pub sample: Sample,
     /// For where on the sample slides begin.
     pub seed: u32,
@@ -139,8 +141,8 @@ impl Recorded {
 }
 
 /// Has the probe make slides, movements of its table in turn, and records them.
-pub async fn record(probe: &Probe, wanted: &Wanted<'_>) -> Result<Recorded> {
-    let Wanted { name, slides, .. } = *wanted;
+pub async fn record(probe: &Probe, wanted: &Wanted) -> Result<Recorded> {
+    let (name, slides) = (&wanted.name[..], wanted.slides);
     let calibration = probe.get(Request::read_calibration()).await?;
     let status = probe.get(Request::status()).await?;
     // a slide of each movement, then the sample is moved

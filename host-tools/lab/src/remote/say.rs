@@ -16,9 +16,6 @@ pub fn most_like(nearest: &Alike) -> String {
 }
 
 /// Prints what a texture that was learned feels most like, and what to do where that is too much.
-///
-/// # Errors
-/// A failure to write.
 pub fn compare(name: &str, is_new: bool, nearest: &Alike, out: &mut impl Write) -> io::Result<()> {
     let other = &nearest.texture;
     let (force_n, speed_mm_s) = (nearest.force_n, nearest.speed_mm_s);

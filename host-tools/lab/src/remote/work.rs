@@ -11,7 +11,7 @@ use super::operations::{self as here, Wanted};
 use crate::data::recording::{Labels, Texture};
 use crate::data::recordings::files_of;
 use crate::eval::show::count;
-use tactus_link::operations::{self, Sample, Training};
+use tactus_link::operations;
 use tactus_link::{OperationError, Probe, say};
 
 type Result<T> = std::result::Result<T, OperationError>;
@@ -25,10 +25,6 @@ pub(super) struct Kept {
 
 fn name_of(name: &str) -> Result<Name> {
     say::name_of(name).map_err(OperationError::said)
-}
-
-fn sample(moved: Option<bool>) -> Sample {
-    moved.map_or(Sample::Asked, |moved| Sample::Noted(Some(moved)))
 }
 
 /// Does what is asked for; then the page knows the table in use.
@@ -53,22 +49,8 @@ pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Res
             };
             here::identify(probe, wanted, |_| ()).await?;
         }
-        Work::Teach { name } => drop(here::teach(probe, name_of(&name)?).await?),
-        Work::Train {
-            name,
-            trials,
-            moved,
-            seed,
-        } => {
-            let training = Training {
-                name: name_of(&name)?,
-                trials,
-                pilot: false,
-                seed,
-                sample: sample(moved),
-            };
-            here::train(probe, &training).await?;
-        }
+        Work::Teach { name } => drop(here::teach(probe, &name).await?),
+        Work::Train(training) => drop(here::train(probe, &training).await?),
         Work::Verify {
             name,
             threshold,
@@ -91,25 +73,8 @@ pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Res
             };
             here::verify(probe, texture, wanted).await?;
         }
-        Work::Record {
-            name,
-            slides,
-            moved,
-            seed,
-        } => {
-            let name = name_of(&name)?;
-            let wanted = Wanted {
-                name: &name,
-                index: 0,
-                slides,
-                sample: sample(moved),
-                seed,
-            };
-            record(probe, &wanted, kept).await?;
-        }
-        Work::Rename { from, to } => {
-            operations::rename(probe, &name_of(&from)?, &name_of(&to)?).await?;
-        }
+        Work::Record(wanted) => record(probe, &wanted, kept).await?,
+        Work::Rename { from, to } => operations::rename(probe, &from, &to).await?,
         Work::Forget { name } => {
             operations::forget(probe, Forget::Texture(name_of(&name)?)).await?;
         }
@@ -134,11 +99,11 @@ pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Res
     Ok(())
 }
 
-async fn record(probe: &Probe, wanted: &Wanted<'_>, kept: &RefCell<Kept>) -> Result<()> {
+async fn record(probe: &Probe, wanted: &Wanted, kept: &RefCell<Kept>) -> Result<()> {
     let recorded = here::record(probe, wanted).await?;
     let texture = Texture {
         id: 1,
-        name: wanted.name.to_owned(),
+        name: wanted.name.trim().to_owned(),
     };
     let labelled = recorded.labelled(&Labels::default());
     let files = files_of(&texture, &labelled).map_err(OperationError::said)?;

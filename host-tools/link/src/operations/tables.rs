@@ -4,10 +4,10 @@
 use std::io::Write as _;
 
 use serde::Serialize;
-use tactus_core::table::{Name, Table};
+use tactus_core::table::Table;
 use tactus_core::wire::{Command, Forget, Status};
 
-use super::Result;
+use super::{Result, name_of};
 use crate::person::{Backup, Question, QuestionKind};
 use crate::request::Request;
 use crate::say;
@@ -44,7 +44,8 @@ async fn consent(probe: &Probe, lost: impl FnOnce(&Table<'_>) -> String) -> Resu
 }
 
 /// Gives a texture another name.
-pub async fn rename(probe: &Probe, from: &Name, to: &Name) -> Result<()> {
+pub async fn rename(probe: &Probe, from: &str, to: &str) -> Result<()> {
+    let (from, to) = (name_of(from)?, name_of(to)?);
     probe.get(Request::rename(from.clone(), to.clone())).await?;
     writeln!(probe.words(), "{from} is {to} now.")?;
     Ok(())

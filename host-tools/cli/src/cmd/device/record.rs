@@ -123,7 +123,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         // some of an interrupted recording, where nobody knows how the sample lay
         writer.forget(index)?;
         let wanted = Wanted {
-            name,
+            name: name.clone(),
             index,
             slides: *slides,
             sample: args.sample.known(),

@@ -76,7 +76,7 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     let typed = name_of(&args.name)?;
     let (mut bench, _) = Bench::open(&args.at, args.format)?;
     let training = Training {
-        name: known_as(typed, &bench.table()?)?,
+        name: known_as(typed, &bench.table()?)?.to_string(),
         trials: args.trials,
         pilot: args.pilot,
         seed: args.seed.unwrap_or_else(seed_of_now),
@@ -96,7 +96,7 @@ pub(crate) fn teach(
     let (mut bench, _) = Bench::open(at, *format)?;
     let name = known_as(typed, &bench.table()?)?;
     let probe = bench.probe();
-    let learned = bench.done(operations::teach(&probe, name), out)?;
+    let learned = bench.done(operations::teach(&probe, &name), out)?;
     print(learned, *format, out)
 }
 
