@@ -4,7 +4,6 @@ use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-pub mod cluster;
 pub mod numpy;
 
 /// The folder of test data `name` ("biotac", "worlds"): below `TACTUS_DATA`, else below `../shared/data`.

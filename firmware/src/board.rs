@@ -1,10 +1,5 @@
-//! The Nucleo-144 (MB1137, UM1974): its clocks, and who gets which pin and timer. Pins are named by their Arduino and Zio
-//! connectors in docs/src/rig.md. Boards of this kind have the same pins for all that is used here; what is each board's own is in
-//! the file of its name.
-#[cfg(feature = "nucleo-f429zi")]
-mod nucleo_f429zi;
-#[cfg(feature = "nucleo-f767zi")]
-mod nucleo_f767zi;
+//! The NUCLEO-F429ZI (MB1137, UM1974): its clocks, and who gets which pin and timer. Pins are named by their Arduino and Zio
+//! connectors in docs/src/rig.md.
 
 use core::mem::ManuallyDrop;
 
@@ -12,31 +7,23 @@ use assign_resources::assign_resources;
 use embassy_stm32::gpio::{Flex, Level, OutputOpenDrain, Pin, Pull, Speed};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
 use embassy_stm32::pac::rcc::vals::Pllsrc;
-use embassy_stm32::pac::{DBGMCU, RCC};
+use embassy_stm32::pac::{DBGMCU, FLASH as FLASH_INTERFACE, RCC};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
 };
 use embassy_stm32::time::Hertz;
-use embassy_stm32::{Peri, PeripheralType, peripherals};
-pub(crate) use nucleo::{Irqs, TURN_CYCLES};
-#[cfg(feature = "nucleo-f429zi")]
-use nucleo_f429zi as nucleo;
-#[cfg(feature = "nucleo-f767zi")]
-use nucleo_f767zi as nucleo;
-#[cfg(feature = "finger-analog")]
-pub(crate) use tactus_core::sensor::analog::Analog as Finger;
-#[cfg(not(any(feature = "finger-analog", feature = "finger-mems")))]
-pub(crate) use tactus_core::sensor::biotac::BioTac as Finger;
-#[cfg(all(feature = "finger-mems", not(feature = "finger-analog")))]
-pub(crate) use tactus_core::sensor::mems::Mems as Finger;
-use tactus_core::sensor::{FingerCode, PressureSensor as _};
+use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
 
-#[cfg(all(feature = "finger-analog", feature = "finger-mems"))]
-compile_error!("an image is for one finger: choose `finger-analog` or `finger-mems`");
+bind_interrupts!(pub(crate) struct Irqs {
+    USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
+    FLASH => flash::InterruptHandler;
+});
 
-/// The finger that this image is for.
-pub(crate) const FINGER: FingerCode = FingerCode::of(Finger::MODEL.name);
+/// Interrupts of the chip (RM0090, table 62).
+const INTERRUPTS: usize = 91;
+/// Cycles that a turn of cortex-m's delay takes on an M4: one, and two of a branch that is taken at the least.
+pub(crate) const TURN_CYCLES: u32 = 3;
 
 assign_resources! {
     sensor: Sensor {
@@ -159,14 +146,16 @@ const LOOKS: u32 = 1000;
 /// The core after its reset.
 pub(crate) const RESET_HZ: u32 = 16_000_000;
 
-/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all.
+/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all. Board tests break it by its name.
+#[unsafe(export_name = "tactus_board_start")]
+#[inline(never)]
 pub(crate) fn start() -> AssignedResources {
     // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at either
     // level.
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
-    nucleo::start_caches();
+    start_caches();
     if external {
         // should it stop later: an NMI, see `rescue`
         RCC.cr().modify(|w| w.set_csson(true));
@@ -188,7 +177,7 @@ pub(crate) fn start() -> AssignedResources {
     // not by `Peripherals::steal`, after which nobody could take them
     // SAFETY: nobody else sets priorities.
     let nvic = unsafe { &*cortex_m::peripheral::NVIC::PTR };
-    for priority in nvic.ipr.iter().take(nucleo::INTERRUPTS) {
+    for priority in nvic.ipr.iter().take(INTERRUPTS) {
         // SAFETY: no critical section is open.
         unsafe { priority.write(MASKED as u8) };
     }
@@ -204,9 +193,21 @@ pub(crate) fn start() -> AssignedResources {
     r
 }
 
+/// embassy sets the wait states alone, five at 168 MHz: prefetch and the instruction cache make up for them (RM0090 3.5.2).
+/// No line of that cache goes stale: bank 2 alone is ever erased, and no code is in it. The data cache stays off. It must
+/// be off while one bank is written and the other one read (ES0206 2.2.12), and would keep what was there before;
+/// embassy's driver means to see to both, but takes this part for one with a single bank, since the list of its
+/// regions ends with the OTP area.
+fn start_caches() {
+    FLASH_INTERFACE.acr().modify(|w| {
+        w.set_prften(true);
+        w.set_icen(true);
+    });
+}
+
 /// What is wrong with the board, in words for the host.
 pub(crate) fn flaw() -> Option<&'static str> {
-    nucleo::flaw().or_else(|| (!has_clock()).then_some(NO_CLOCK))
+    (!has_clock()).then_some(NO_CLOCK)
 }
 
 /// What is to be said of a board whose probe gives no clock.

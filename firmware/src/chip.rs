@@ -1,30 +1,25 @@
 //! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its converter's motor current, its
-//! last acts, and the core's kernels in its assembly. What its family does in its own way is in the file of the family.
+//! last acts, and the core's kernels in its assembly.
+mod bank2;
 mod confusion_kernel;
 mod critical_section;
 pub(crate) mod current;
 mod decision_kernels;
 mod dsp_kernels;
-#[cfg(feature = "nucleo-f429zi")]
-mod f4;
-#[cfg(feature = "nucleo-f767zi")]
-mod f7;
+pub(crate) mod finger;
 pub(crate) mod flash;
 pub(crate) mod lever;
 pub(crate) mod motion;
 pub(crate) mod rescue;
 mod select;
 pub(crate) mod slots;
+mod spi;
 mod store_place;
 pub(crate) mod thread;
 mod transform_kernel;
 pub(crate) mod watchdog;
 
 pub(crate) use dsp_kernels::Chip;
-#[cfg(feature = "nucleo-f429zi")]
-use f4 as family;
-#[cfg(feature = "nucleo-f767zi")]
-use f7 as family;
 
 use crate::board::TURN_CYCLES;
 

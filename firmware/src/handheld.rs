@@ -15,9 +15,9 @@ use embassy_stm32::interrupt::{self as irq, InterruptExt as _, Priority};
 use heapless::spsc::Queue;
 use static_cell::ConstStaticCell;
 
-use crate::board;
+use crate::boot::start;
+use crate::chip::rescue;
 use crate::chip::slots::{self, WORDS, Word};
-use crate::chip::{rescue, watchdog};
 use crate::tasks::{acquire, display, hand, link, only};
 
 static HAND: InterruptExecutor = InterruptExecutor::new();
@@ -31,14 +31,7 @@ fn UART7() {
 /// Starts everything, and sleeps whenever nothing is to be done. To be called once, from thread mode.
 pub fn handheld() -> ! {
     static WORD_QUEUE: ConstStaticCell<Queue<Word, WORDS>> = ConstStaticCell::new(Queue::new());
-    let (reset, last_words) = rescue::reset_cause();
-    watchdog::start();
-    rescue::guard_stack();
-    let r = board::start();
-    defmt::info!("tactus-handheld {=str}", env!("CARGO_PKG_VERSION"));
-    if let Some(words) = &last_words {
-        defmt::error!("before the reset: {=str}", words.as_str());
-    }
+    let (r, reset, last_words) = start("tactus-handheld");
     let (words_in, words_out) = WORD_QUEUE.take().split();
     irq::I2C1_EV.set_priority(Priority::P6);
     irq::I2C1_ER.set_priority(Priority::P6);
@@ -46,17 +39,21 @@ pub fn handheld() -> ! {
     irq::DMA1_STREAM6.set_priority(Priority::P6);
     irq::UART7.set_priority(Priority::P7);
     let hands = HAND.start(interrupt::UART7);
-    hand::booted(reset, last_words);
     // until `hand` can take them
     slots::listen(false);
-    hands.spawn(only(acquire::acquire(r.sensor, r.slots, words_in)));
+    hands.spawn(only(acquire::acquire(r.sensor, r.slots, words_in, reset)));
     let Some((tx, rx)) = link::open(r.link) else {
         rescue::refuse("the link's rate cannot be had");
     };
     hands.spawn(only(link::send(tx)));
     hands.spawn(only(link::receive(rx, &hand::BODY)));
     hands.spawn(only(hand::hand(
-        r.store, r.handle, r.go, r.motion, words_out,
+        r.store,
+        r.handle,
+        r.go,
+        r.motion,
+        words_out,
+        (reset, last_words),
     )));
     hands.spawn(only(display::show(r.display)));
     hands.spawn(only(hand::watch()));

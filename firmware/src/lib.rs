@@ -1,25 +1,21 @@
-//! Tactus on a NUCLEO-F429ZI: pins, timing and messages round the core. Everything that decides is in `tactus-core`. The rig's image is
-//! there for a NUCLEO-F767ZI, too.
+//! Tactus on a NUCLEO-F429ZI: pins, timing and messages round the core. Everything that decides is in `tactus-core`.
 //!
 //! On a PC this crate is empty: there is nothing to drive.
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg(target_os = "none")]
 
-#[cfg(feature = "arm")]
 mod arm;
-#[cfg(all(feature = "nucleo-f429zi", feature = "early"))]
 mod bench;
 mod board;
+mod boot;
 mod chip;
 mod handheld;
 mod rig;
 mod selftest;
 mod tasks;
 
-#[cfg(feature = "arm")]
 pub use arm::arm;
-#[cfg(all(feature = "nucleo-f429zi", feature = "early"))]
-pub use bench::{bench, silicon, workload};
+pub use bench::{silicon, workload};
 pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;

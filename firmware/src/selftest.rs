@@ -83,7 +83,7 @@ pub async fn selftest() {
         };
         chip(&mut account);
         brown_out();
-        let touch = sensor(r.sensor, &mut account).await;
+        let touch = sensor(r.sensor, reset, &mut account).await;
         rig(
             r.lever,
             r.stage,

@@ -4,7 +4,6 @@ use embassy_executor::{SpawnError, SpawnToken};
 use crate::chip::rescue;
 
 pub(crate) mod acquire;
-#[cfg(feature = "arm")]
 pub(crate) mod arm;
 pub(crate) mod display;
 pub(crate) mod drive;

@@ -6,13 +6,11 @@ mod candidates;
 mod choice;
 mod config;
 mod confusions;
-#[cfg(any(test, feature = "early"))]
 mod early;
 mod episode;
 pub mod kernels;
 mod likelihoods;
 mod novelty;
-#[cfg(any(test, feature = "timed"))]
 mod objective;
 pub mod overlap;
 mod paced;
@@ -25,11 +23,9 @@ pub use answer::{Answer, Verification};
 pub use choice::{ExpectedOutcome, benefit, confusion};
 pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strategy};
 pub use confusions::{Confusions, Degrees};
-#[cfg(any(test, feature = "early"))]
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
 pub use kernels::Kernels;
-#[cfg(any(test, feature = "timed"))]
 pub use objective::{Objective, SlideTime};
 pub use posterior::{Explorer, Told, Verdict};
 pub use verify::ENOUGH_TRIALS;

@@ -14,7 +14,6 @@ pub mod jobs;
 pub mod judge;
 pub mod picture;
 pub mod screen;
-mod small;
 mod speed;
 mod spelling;
 pub mod states;
@@ -28,7 +27,6 @@ pub use judge::{
 };
 pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};
-pub use small::Small;
 pub use speed::Moved;
 pub use spelling::{Place, WHEEL};
 pub use states::{Answer, Asked, Choice, Handheld, Job, TICKS_HZ};

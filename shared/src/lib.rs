@@ -4,11 +4,18 @@
 //!
 //! The crate has no std, no allocation, no unsafe code, no clock and no statics: the same functions run on the chip and on
 //! a PC, and give the same bits.
-//!
-//! For the chip it is compiled for speed, and what is generic or `#[inline]` with the firmware, for size (`Cargo.toml`):
-//! large functions that nobody waits for are `#[inline]`.
 #![no_std]
 #![forbid(unsafe_code)]
+// Nothing panics on the chip: what these do not see, `cargo xtask size` finds in the images.
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::expect_used,
+        clippy::indexing_slicing,
+        clippy::panic,
+        clippy::unwrap_used
+    )
+)]
 
 #[cfg(test)]
 extern crate std;

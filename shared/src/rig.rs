@@ -5,7 +5,6 @@
 //! What is done every millisecond is `#[inline]` here: so it is compiled with the firmware, which is optimised for size,
 //! and not with the kernels of this crate.
 
-#[cfg(any(feature = "arm", test))]
 pub mod arm;
 mod ascent;
 pub mod calibration;
@@ -14,7 +13,6 @@ pub mod fault;
 pub mod force;
 pub mod guard;
 pub mod lever;
-#[cfg(any(feature = "arm", test))]
 pub mod over_link;
 pub mod phase;
 pub mod pins;

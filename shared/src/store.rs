@@ -1,4 +1,4 @@
-//! What survives a power cut: the texture table, and the settings of this rig.
+//! The data that survives a power cut: the texture table, and the settings of this rig.
 //!
 //! A [`Store`] owns six erase sectors (256 KB of the chip, `STORE` in `board.x`):
 //!

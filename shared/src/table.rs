@@ -1,15 +1,15 @@
 //! The texture table: what every known texture feels like at every movement, in fixed point.
 //!
-//! A [`Table`] borrows the binary form, from flash or a file, and copies nothing. There are two kinds of contents, for the
-//! two ways of deciding: one Gaussian per (texture, movement, property), learned as [`Experience`] and written by
+//! A [`Table`] borrows the binary form, from flash or a file, and copies nothing. There are two kinds of contents, for
+//! the two ways of deciding: one Gaussian per (texture, movement, property), learned as [`Experience`] and written by
 //! [`encode`]; or the mean of all features of a slide in whitened space, learned as [`Whitened`] and written by
 //! [`encode_fused`]. [`amend`] learns, renames and deletes textures of either kind.
 //!
 //! # Binary form, version 4, little-endian
 //!
-//! A table without sections is written as version 3, one that knows speeds (section 4) as version 5, one that knows shorter
-//! slides (section 6) as version 6; they are the same otherwise. All are read, version 5 by a build that knows speeds, version 6
-//! by one that can end a slide early.
+//! A table without sections is written as version 3, one that knows speeds (section 4) as version 5, one that knows
+//! shorter slides (section 6) as version 6; they are the same otherwise. All are read, version 5 by a build that knows
+//! speeds, version 6 by one that can end a slide early.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -43,14 +43,17 @@
 //! | 4 | M (6 + 2 d) | version 5, per movement the [`Pace`] of slides: mean (i16, 1/1024) and variance of ln(speed), slope of all textures (d i16, 1/256) |
 //! | | 2 d T M | per texture and movement: its [`Slope`] |
 //!
-//! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per texture
-//! of which that is known: its number (2), the lower half of the CRC-32 of its name (2), and 1 for no or 2 for yes (1).
+//! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per
+//! texture of which that is known: its number (2), the lower half of the CRC-32 of its name (2), and 1 for no or 2 for
+//! yes (1).
 //!
-//! Section 5, of either kind of table: the finger that it was learned with (1: 0 `biotac`, 1 `analog`, 2 `mems`), and the day on which
-//! that finger's force per count was measured (4, as 20261121). Without it a table is a BioTac's. A probe of another finger refuses it.
+//! Section 5, of either kind of table: the finger that it was learned with (1: 0 `biotac`, 1 `analog`, 2 `mems`), and
+//! the day on which that finger's force per count was measured (4, as 20261121). Without it a table is a BioTac's. A
+//! probe of another finger refuses it.
 //!
-//! Section 6, of either kind of table, is what the first part of a slide says: one section for each length, the shortest first
-//! ([`with_lengths`]). A table has slopes or lengths, never both. A texture that is learned or deleted takes all lengths with it.
+//! Section 6, of either kind of table, is what the first part of a slide says: one section for each length, the
+//! shortest first ([`with_lengths`]). A table has slopes or lengths, never both. A texture that is learned or deleted
+//! takes all lengths with it.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -84,8 +87,7 @@ pub use encode::{
 };
 pub use finger::{FINGER_LENGTH, with_finger};
 pub use format::{
-    Action, Contents, EARLY, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, PACED, TableError,
-    Tally, VERSION,
+    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub use lengths::{MAX_LENGTHS, Shorter, lengths_length, with_lengths};

@@ -14,7 +14,6 @@ mod sparse;
 mod text;
 
 pub use crate::explorer::ExpectedOutcome;
-#[cfg(any(feature = "arm", test))]
 pub use crate::rig::arm::{ArmMovement, ArmOrder, ArmReport, ArmState, ArmTask};
 pub use command::{Command, Forget, Identify, PART, Request, Train};
 pub use event::{

@@ -121,7 +121,6 @@ fn help_says_what_it_is_and_what_to_try_first() {
 fn the_command_is_tactus_whatever_its_package() {
     let version = concat!("tactus ", env!("CARGO_PKG_VERSION"), "\n");
     assert_eq!(printed(&["--version"]), version);
-    assert!(printed(&["man"]).contains(".TH tactus 1 "));
 }
 
 #[test]
@@ -816,69 +815,6 @@ fn properties_are_evaluated_and_checked() {
     );
     fs::write(&file, csv.replace("validate", "train2")).unwrap();
     assert!(complaint(&evaluate).contains("train2"));
-}
-
-/// With the dataset a table takes two commands.
-#[test]
-fn a_table_is_learned_from_the_cluster_dataset() {
-    use tactus_tests::cluster::{EXAMPLE, Slide};
-    let temp = tempfile::tempdir().unwrap();
-    for (surface, hz) in [(0, 120.0), (7, 210.0), (117, 330.0)] {
-        for (mn, repetition) in [(500, 0), (500, 1), (1000, 0), (1000, 1)] {
-            for degrees in [0, 45, 90] {
-                // no two slides are the same
-                let hz = hz + f64::from(repetition + degrees / 45);
-                let slide = Slide {
-                    surface,
-                    hz,
-                    mn,
-                    repetition,
-                    degrees,
-                    ..EXAMPLE
-                };
-                slide.write(temp.path()).unwrap();
-            }
-        }
-    }
-    let [recordings, table] = ["recordings", "table"].map(|name| temp.path().join(name));
-    let said = printed(&["import", "cluster", path(temp.path()), path(&recordings)]);
-    assert!(said.ends_with("3 textures, 36 slides\n"), "{said}");
-    let learn = [
-        "learn",
-        "--recordings",
-        path(&recordings),
-        "--out",
-        path(&table),
-    ];
-    printed(&[&learn[..], &["--train-slides", "3"]].concat());
-    let said = printed(&["table", "show", path(&table)]);
-    assert!(
-        said.contains("surface 117") && said.contains("finger: mems"),
-        "{said}"
-    );
-    // slides of a BioTac say nothing about it
-    let simulated = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
-    let said = complaint(&["report", path(&table), "--recordings", simulated]);
-    let why = "learned with the finger mems, but the finger here is biotac";
-    assert!(
-        said.contains(why) && said.contains("Use a table that was learned with biotac"),
-        "{said}"
-    );
-    let evaluate = [
-        "evaluate",
-        "--recordings",
-        path(&recordings),
-        "--runs",
-        "50",
-    ];
-    let said = printed(
-        &[
-            &evaluate[..],
-            &["--protocol", "blocked", "--train-slides", "3"],
-        ]
-        .concat(),
-    );
-    assert!(said.contains("blocked"), "{said}");
 }
 
 /// Name and bytes of each file of a folder, not of the folders in it.

@@ -8,9 +8,8 @@ use std::process::{Command, Output};
 
 use flate2::read::GzDecoder;
 use mcap::MessageStream;
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
-use serde_json::{Value, json};
-use tactus_core::features::{FUSED_BANDS, Property};
+use serde_json::Value;
+use tactus_core::features::Property;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::measure_all;
 
@@ -238,155 +237,6 @@ assert numpy.isfinite(a['ln_bands']).all()",
     );
 }
 
-/// The rows of a Parquet file as JSON, and what is said of all of them.
-fn rows(file: &Path) -> (Vec<Value>, BTreeMap<String, String>) {
-    let reader = SerializedFileReader::new(fs::File::open(file).unwrap()).unwrap();
-    let said = reader.metadata().file_metadata().key_value_metadata();
-    let said = said.unwrap().iter().cloned();
-    let said = said.map(|of| (of.key, of.value.unwrap())).collect();
-    let rows = reader.get_row_iter(None).unwrap();
-    (rows.map(|row| row.unwrap().to_json_value()).collect(), said)
-}
-
-/// What Arrow's reader makes of it: the same rows, and the units of their numbers.
-const PYARROW: &str = "import sys, json, pyarrow.parquet
-t = pyarrow.parquet.read_table(sys.argv[1])
-wanted = json.loads(sys.argv[2])
-units = json.loads(t.schema.metadata[b'units'])
-assert units['force_n'] == 'N' and set(units) <= set(t.column_names), units
-found = []
-for row in t.to_pylist():
-    found.append([row['texture'], row['slide'], row['roughness'], len(row['ln_bands']), sum(p for _, p in row['posterior'])])
-assert len(found) == len(wanted), (len(found), len(wanted))
-for f, w in zip(found, wanted):
-    assert f[:2] == w[:2] and f[3] == w[3], (f, w)
-    assert abs(f[2] - w[2]) < 1e-6 and abs(f[4] - w[4]) < 1e-6, (f, w)";
-
-/// What of each row [`PYARROW`] compares.
-fn read_by_pyarrow(file: &Path, rows: &[Value]) {
-    let compared = rows.iter().map(|row| {
-        let posterior = row["posterior"].as_object().unwrap().values();
-        let sum: f64 = posterior.map(|p| p.as_f64().unwrap()).sum();
-        let bands = row["ln_bands"].as_array().unwrap().len();
-        json!([row["texture"], row["slide"], row["roughness"], bands, sum])
-    });
-    let compared = Value::from_iter(compared).to_string();
-    python(PYARROW, &[text(file), &compared], "pyarrow");
-}
-
-#[test]
-fn a_parquet_of_recordings_holds_features_and_what_a_table_makes_of_them() {
-    let temp = tempfile::tempdir().unwrap();
-    let [table, file] = ["table", "slides.parquet"].map(|name| temp.path().join(name));
-    let learned = tactus(&[
-        "learn",
-        "--recordings",
-        RECORDINGS,
-        "--train-slides",
-        "2",
-        "--out",
-        text(&table),
-    ]);
-    assert!(learned.status.success(), "{learned:?}");
-    let written = tactus(&[
-        "convert",
-        RECORDINGS,
-        "--parquet",
-        text(&file),
-        "--table",
-        text(&table),
-    ]);
-    assert!(written.status.success(), "{written:?}");
-    let (rows, said) = rows(&file);
-    let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
-    let measured = measure_all(&set, |_| ()).unwrap();
-    let names = set.names();
-    let slides = measured.iter().zip(&names);
-    let slides = slides.flat_map(|(slides, name)| slides.iter().map(move |slide| (name, slide)));
-    assert_eq!(rows.len(), slides.clone().count());
-    let mut right = 0;
-    for ((name, slide), row) in slides.zip(&rows) {
-        assert_eq!(row["texture"], **name);
-        assert_eq!(row["slide"], slide.number);
-        assert_eq!(row["exploration"], Value::Null);
-        let number = |name: &str| row[name].as_f64().map(|x| x as f32);
-        assert_eq!(number("force_n"), Some(slide.movement.force_n()));
-        assert_eq!(number("speed_mm_s"), Some(slide.movement.speed_mm_s()));
-        let of = |property| slide.measurement.properties.get(property);
-        assert_eq!(number("traction_n"), of(Property::Traction));
-        assert_eq!(number("roughness"), of(Property::Roughness));
-        assert_eq!(number("fineness"), of(Property::Fineness));
-        let bands = row["ln_bands"].as_array().unwrap();
-        assert_eq!(bands.len(), FUSED_BANDS);
-        for (told, band) in bands.iter().zip(slide.measurement.fused_bands()) {
-            // in steps of 1/1024
-            assert!((told.as_f64().unwrap() - f64::from(band)).abs() < 5e-4);
-        }
-        let (mean, _) = slide.measurement.pdc.unwrap();
-        assert!((number("pdc_mean").unwrap() - mean).abs() < 0.05);
-        let posterior = row["posterior"].as_object().unwrap();
-        let sum: f64 = posterior.values().map(|p| p.as_f64().unwrap()).sum();
-        assert!((sum - 1.0).abs() < 1e-4, "{sum}");
-        let likely = row["most_likely"].as_str().unwrap();
-        assert_eq!(posterior[likely], row["probability"]);
-        right += usize::from(likely == name);
-    }
-    // most of them were learned from
-    assert!(5 * right > 4 * rows.len(), "{right} of {}", rows.len());
-    assert_eq!(said["finger"], "biotac");
-    let about: Value = serde_json::from_str(&said["table"]).unwrap();
-    assert_eq!(about["textures"], names.len());
-    read_by_pyarrow(&file, &rows);
-    // the same from a pipe
-    let piped = tactus(&[
-        "convert",
-        RECORDINGS,
-        "--parquet",
-        "-",
-        "--table",
-        text(&table),
-    ]);
-    assert!(piped.status.success() && piped.stdout == fs::read(&file).unwrap());
-}
-
-#[test]
-fn a_parquet_of_a_log_holds_what_the_probe_said_of_each_slide() {
-    let temp = tempfile::tempdir().unwrap();
-    let (log, lines) = session(temp.path());
-    let file = temp.path().join("session.parquet");
-    convert(&log, "--parquet", &file);
-    let (rows, said) = rows(&file);
-    let reports = lines.iter().map(|line| &line["report"]);
-    let slides: Vec<(&Value, &Value)> = reports
-        .filter_map(|report| Some((report, report["tell"].get("Felt")?)))
-        .collect();
-    assert_eq!(rows.len(), slides.len());
-    for (row, (report, told)) in rows.iter().zip(slides) {
-        assert_eq!(row["exploration"], 1);
-        assert_eq!(row["slide"], told["slide"]);
-        let at_ms = row["time_s"].as_f64().unwrap() * 1e3;
-        assert!((at_ms - report["at_ms"].as_f64().unwrap()).abs() < 1e-6);
-        let told_of = &told["felt"]["properties"];
-        for (at, name) in ["traction_n", "roughness", "fineness"]
-            .into_iter()
-            .enumerate()
-        {
-            let told = told_of[at].as_f64().map(|x| x as f32);
-            assert_eq!(row[name].as_f64().map(|x| x as f32), told, "{name}");
-        }
-        assert!(row["force_n"].as_f64().unwrap() > 0.0);
-    }
-    let verdict = lines
-        .iter()
-        .find_map(|line| line["report"]["tell"].get("Verdict"));
-    assert_eq!(
-        rows.last().unwrap()["most_likely"],
-        verdict.unwrap()["name"]
-    );
-    assert!(said["from"].ends_with("session.jsonl") && said.contains_key("table"));
-    read_by_pyarrow(&file, &rows);
-}
-
 #[test]
 fn files_go_through_pipes() {
     let temp = tempfile::tempdir().unwrap();
@@ -424,55 +274,12 @@ fn what_cannot_be_converted_is_told() {
     let of_a_log = tactus(&["convert", text(&log), "--npz", text(&to)]);
     assert_eq!(of_a_log.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&of_a_log.stderr).contains("--mcap"));
-    let table = tactus(&[
-        "convert",
-        text(&log),
-        "--parquet",
-        text(&to),
-        "--table",
-        "t",
-    ]);
-    assert_eq!(table.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&table.stderr).contains("recordings"));
     assert!(!to.exists());
     fs::write(&to, "mine").unwrap();
     let over = tactus(&["convert", RECORDINGS, "--mcap", text(&to)]);
     assert_eq!(over.status.code(), Some(1));
     assert_eq!(fs::read(&to).unwrap(), b"mine");
     let nothing = tactus(&["convert", RECORDINGS]);
-    assert_eq!(nothing.status.code(), Some(2));
-}
-
-#[test]
-fn a_picture_shows_the_panels_of_the_layout() {
-    let temp = tempfile::tempdir().unwrap();
-    let (log, _) = session(temp.path());
-    let [file, picture] = ["session.mcap", "channels.svg"].map(|name| temp.path().join(name));
-    let drawn = tactus(&[
-        "convert",
-        text(&log),
-        "--mcap",
-        text(&file),
-        "--plot",
-        text(&picture),
-    ]);
-    assert!(drawn.status.success(), "{drawn:?}");
-    let svg = fs::read_to_string(&picture).unwrap();
-    let layout = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/plotjuggler.xml");
-    let layout = fs::read_to_string(layout).unwrap();
-    let layout = roxmltree::Document::parse(&layout).unwrap();
-    let nodes = layout.descendants();
-    let curves = nodes.filter(|node| node.has_tag_name("curve"));
-    let curves: Vec<&str> = curves.map(|node| node.attribute("name").unwrap()).collect();
-    assert_eq!(curves.len(), 6);
-    for curve in curves {
-        assert!(svg.contains(curve), "{curve}");
-    }
-    // the file is the one without a picture
-    let plain = temp.path().join("plain.mcap");
-    convert(&log, "--mcap", &plain);
-    assert!(fs::read(plain).unwrap() == fs::read(&file).unwrap());
-    let nothing = tactus(&["convert", text(&log), "--parquet", "x", "--plot", "y.svg"]);
     assert_eq!(nothing.status.code(), Some(2));
 }
 

@@ -4,8 +4,6 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use serde_json::Value;
-
 const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
 
 fn command(arguments: &[&str]) -> Command {
@@ -223,59 +221,6 @@ fn the_environment_names_the_recordings_and_the_port() {
 }
 
 #[test]
-fn a_file_of_settings_says_port_recordings_and_defaults() {
-    let temp = tempfile::tempdir().unwrap();
-    let below = temp.path().join("a/b");
-    std::fs::create_dir_all(&below).unwrap();
-    let copied = temp.path().join("mine");
-    std::fs::create_dir(&copied).unwrap();
-    for entry in std::fs::read_dir(SIMULATED).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), copied.join(entry.file_name())).unwrap();
-    }
-    let file = temp.path().join("tactus.toml");
-    let settings =
-        "port = \"127.0.0.1:1\"\nrecordings = \"mine\"\n[defaults.features]\nformat = \"csv\"\n";
-    std::fs::write(&file, settings).unwrap();
-    let run = |arguments: &[&str]| {
-        let mut run = command(arguments);
-        run.current_dir(&below).env_remove("TACTUS_CONFIG");
-        run.output().unwrap()
-    };
-    let csv = run(&["features"]).stdout;
-    assert_eq!(String::from_utf8(csv).unwrap().lines().count(), 55);
-    // what is given goes before
-    let json = String::from_utf8(run(&["features", "--format", "json"]).stdout).unwrap();
-    assert!(json.starts_with('{'), "{json}");
-    let status = run(&["device", "status"]);
-    assert!(String::from_utf8_lossy(&status.stderr).contains("127.0.0.1:1"));
-    let shown: Value =
-        serde_json::from_slice(&run(&["config", "--format", "json"]).stdout).unwrap();
-    assert_eq!(shown["port"], "127.0.0.1:1");
-    assert_eq!(shown["defaults"]["features"]["format"], "csv");
-    let shown = run(&["config"]).stdout;
-    assert!(String::from_utf8_lossy(&shown).contains("tactus features --format="));
-    // another command has no such default
-    let textures = run(&["textures"]);
-    assert!(textures.status.success(), "{textures:?}");
-    for (wrong, says) in [
-        ("prot = \"x\"", "prot"),
-        ("[defaults.featurs]\nformat = \"csv\"", "featurs"),
-        ("[defaults.features]\nfromat = \"csv\"", "--fromat"),
-        ("port = ", "tactus config --help"),
-    ] {
-        std::fs::write(&file, wrong).unwrap();
-        let refused = run(&["features"]);
-        assert_eq!(refused.status.code(), Some(1), "{wrong}");
-        let said = String::from_utf8(refused.stderr).unwrap();
-        assert!(
-            said.contains(says) && said.contains("tactus.toml"),
-            "{said}"
-        );
-    }
-}
-
-#[test]
 fn tables_and_logs_are_read_from_standard_input() {
     let table = std::fs::File::open(concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -332,7 +277,10 @@ fn figures_are_written_for_people() {
 
 #[test]
 fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
-    let alone = json(&["gauge", "--recordings", SIMULATED, "--format", "json"], 0);
+    let alone = json(
+        &["report", "--recordings", SIMULATED, "--format", "json"],
+        0,
+    );
     assert_eq!((&alone["parts"], &alone["slides"]), (&6.into(), &54.into()));
     let movements = alone["movements"].as_array().unwrap();
     assert_eq!(movements.len(), 3);
@@ -368,10 +316,10 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
     });
     let [anna, ben] = [&folders[0], &folders[1]].map(|folder| path(folder));
     let both = [
-        "gauge",
+        "report",
         "--recordings",
         anna,
-        "--and",
+        "--recordings",
         ben,
         "--format",
         "json",
@@ -384,7 +332,16 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
         let [one, two] = [of(one), of(two)].map(|sd| sd["part"].as_f64().unwrap());
         assert!((one - two).abs() < 0.1 * one, "{one} and {two}");
     }
-    let twice = said(&["gauge", "--recordings", SIMULATED, "--and", SIMULATED], 2);
+    let twice = said(
+        &[
+            "report",
+            "--recordings",
+            SIMULATED,
+            "--recordings",
+            SIMULATED,
+        ],
+        2,
+    );
     assert!(twice.contains("was given before"), "{twice}");
 }
 
@@ -636,9 +593,9 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
 }
 
 #[test]
-fn a_log_is_shown_as_objects_and_filmed() {
+fn a_log_is_shown_as_objects() {
     let temp = tempfile::tempdir().unwrap();
-    let [log, film] = ["session.jsonl", "film.svg"].map(|name| temp.path().join(name));
+    let log = temp.path().join("session.jsonl");
     let packed = "../../tests/golden/identify.jsonl.gz";
     let packed = fs::File::open(Path::new(env!("CARGO_MANIFEST_DIR")).join(packed)).unwrap();
     let mut unpacked = fs::File::create(&log).unwrap();
@@ -661,38 +618,4 @@ fn a_log_is_shown_as_objects_and_filmed() {
         (slide["traction_n"].as_f64().unwrap() - 1.565_463).abs() < 1e-5,
         "{slide}"
     );
-    // a film of another size, and what is no size or no picture
-    let film_of = |size: &'static str, out: &Path| {
-        command(&[
-            "device",
-            "log",
-            "film",
-            path(&log),
-            "--size",
-            size,
-            "--out",
-            path(out),
-        ])
-        .output()
-        .unwrap()
-    };
-    assert!(film_of("100x30", &film).status.success());
-    let svg = fs::read_to_string(&film).unwrap();
-    assert!(svg.contains("Polyurethane rubber") && svg.contains("width=\"856\""));
-    for (size, out) in [("59x30", "a.svg"), ("60", "a.svg"), ("60x24", "a.png")] {
-        let done = film_of(size, &temp.path().join(out));
-        assert_eq!(done.status.code(), Some(2), "{size} {out}");
-    }
-    // a log in which nobody was talked to
-    fs::write(
-        &log,
-        "{\"session\":{\"tactus\":\"0.1.0\",\"protocol\":6,\"port\":\"x\"}}\n",
-    )
-    .unwrap();
-    let said = String::from_utf8(film_of("60x24", &film).stderr).unwrap();
-    assert!(
-        said.contains("session.jsonl: the probe does not say"),
-        "{said}"
-    );
-    assert_eq!(fs::read_to_string(&film).unwrap(), svg);
 }

@@ -12,7 +12,6 @@ mod fixed_point;
 mod fused_recipe;
 mod golden;
 mod high_force;
-mod objective;
 mod oracle;
 mod pace;
 mod page;

@@ -130,7 +130,7 @@ fn pictures_can_be_read_and_change_nothing_else() {
     let (log, paper_log) = (log.to_str().unwrap(), paper_log.to_str().unwrap());
     let recorded = |more: &[&'static str]| [&more[..1], &RECORDINGS, &more[1..]].concat();
     let all = |figures: &[&'static str]| figures.to_vec();
-    let exploration = || all(&["posterior", "spectrum", "timeline"]);
+    let exploration = || all(&["posterior", "spectrum"]);
     let commands: Vec<(Vec<&str>, Vec<&str>)> = vec![
         (
             recorded(&[
@@ -147,16 +147,6 @@ fn pictures_can_be_read_and_change_nothing_else() {
                 "errors-by-threshold",
                 "reliability",
                 "slides-by-threshold",
-            ]),
-        ),
-        (
-            recorded(&["evaluate", "--lifelong", "--runs", "3"]),
-            all(&[
-                "drift-by-texture",
-                "drift",
-                "told-asking",
-                "told-learning-by-itself",
-                "told-without-learning",
             ]),
         ),
         (recorded(&["identify", "--material", "91"]), exploration()),

@@ -22,8 +22,8 @@ use tactus_core::features::{Movement, Observation, Properties, Property, Propert
 use tactus_core::sensor::pressure::{RATE_HZ, SLOTS_HZ};
 use tactus_core::table::{Action, Experience, Table, Texture, encode, factory};
 
-use super::Cycles;
 use super::workload::{Counter, ObservedSlide, Workload, run};
+use super::{Cycles, bench, is_wanted};
 use crate::board;
 use crate::chip::Chip;
 use crate::chip::current::{CONVERSIONS, Current};
@@ -162,6 +162,9 @@ impl Results {
 
 /// Makes all checks, says how they went, and leaves if a debugger is there. To be called once, from thread mode.
 pub async fn silicon() {
+    if is_wanted() {
+        bench();
+    }
     let r = board::start();
     // a probe attaches
     Timer::after_millis(20).await;

@@ -9,7 +9,8 @@ use tactus_core::probe::seams::StoredBytes;
 use tactus_core::sensor::FingerCode;
 use tactus_core::store::{Store, StoreError};
 
-use super::family::bank2::Bank2;
+use super::bank2::Bank2;
+use super::finger;
 use super::store_place::{STORE_AT, STORE_LENGTH};
 use crate::board;
 
@@ -21,7 +22,7 @@ const LOOKS: u32 = 100;
 /// A look finds an erase over that no interrupt has told of.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Room for the longest table, which the start-up code does not clear: board.x; on the STM32F429 in the CCM, which nothing else uses.
+/// Room for the longest table, which the start-up code does not clear: memory.x; in the CCM, which nothing else uses.
 #[unsafe(link_section = ".ccm.BUFFER")]
 static mut BUFFER: MaybeUninit<[u8; MAX_TABLE]> = MaybeUninit::uninit();
 
@@ -72,7 +73,7 @@ pub(crate) struct MappedTable;
 
 impl StoredBytes<Bank2> for MappedTable {
     fn finger(&self) -> FingerCode {
-        board::FINGER
+        finger::code()
     }
 
     fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {

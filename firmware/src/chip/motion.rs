@@ -14,8 +14,7 @@ use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use tactus_core::sensor::paa5100je::CLOCK_HZ;
 
 use crate::board::{self, held};
-use crate::chip::family::spi;
-use crate::chip::wait_cycles;
+use crate::chip::{spi, wait_cycles};
 
 /// The bus: 84 MHz / 64.
 const DIVIDER: Br = Br::DIV64;
@@ -70,17 +69,16 @@ fn restart() {
     control.set_ssm(true);
     control.set_ssi(true);
     control.set_spe(true);
-    spi::use_bytes(SPI4);
     SPI4.cr1().write_value(control);
 }
 
 /// Sends a byte and gives what came in; `None`: it did not end in three times its time.
 fn byte(out: u8) -> Option<u8> {
-    spi::send(SPI4, out.into(), false);
+    spi::send(SPI4, out.into());
     wait_cycles(BYTE_CYCLES);
     for _ in 0..2 * LOOKS {
         if SPI4.sr().read().rxne() {
-            return Some(spi::received(SPI4, false) as u8);
+            return Some(spi::received(SPI4) as u8);
         }
         wait_cycles(BYTE_CYCLES / LOOKS);
     }

@@ -83,7 +83,7 @@ pub(crate) fn remember(text: &str) {
 
 /// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing here
 /// needs an interrupt, memory or another task.
-fn give_up(why: &str) -> ! {
+pub(crate) fn give_up(why: &str) -> ! {
     cortex_m::interrupt::disable();
     remember(why);
     if ARMED.load(Relaxed) {
@@ -140,7 +140,7 @@ pub(crate) fn guard_stack() {
     const NO_CODE: u32 = 1 << 28;
     // the rest is as without the MPU; on
     const PRIVDEFENA: u32 = 1 << 2;
-    // SAFETY: nobody else uses the MPU, and the linker has left the guard free: board.x.
+    // SAFETY: nobody else uses the MPU, and the linker has left the guard free: memory.x.
     unsafe {
         let mpu = &*MPU::PTR;
         mpu.rnr.write(0);

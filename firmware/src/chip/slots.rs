@@ -1,6 +1,6 @@
 //! The sensor's slots: SPI1 with its pins, the chip selects, and the timer TIM2, which this module owns wholly.
 //!
-//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`PressureSensor::SLOTS`]): the timer's interrupts
+//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`FingerParts::slots`]): the timer's interrupts
 //! begin a transaction, the bus's interrupt ends each of its frames, and nobody waits for either. What does not end in its time
 //! is given up when the timer comes next. embassy's driver of the bus has no transfers by its interrupt: it spins for each
 //! byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
@@ -11,21 +11,19 @@ use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::spi::regs::Cr1;
-use embassy_stm32::pac::spi::vals::{Br, Mstr};
+use embassy_stm32::pac::spi::vals::{Br, Dff, Mstr};
 use embassy_stm32::pac::{SPI1, TIM2};
 use embassy_stm32::{Peri, peripherals, rcc};
 use heapless::spsc::Producer;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{Answer, Port, Transaction, length_us};
-use tactus_core::sensor::{BadWord, GRAVITY_PARTS, PressureSensor};
+use tactus_core::sensor::{
+    AnyFinger, BadWord, FingerError, FingerName, FingerParts, GRAVITY_PARTS, SLOWEST_HZ,
+};
 
-use crate::board::{self, Finger, held};
-use crate::chip;
-use crate::chip::family::spi;
+use crate::board::{self, held};
 use crate::chip::select::Select;
-
-/// Why an answer of the finger is no sample.
-pub(crate) type FingerError = <Finger as PressureSensor>::Error;
+use crate::chip::{self, finger, spi};
 
 /// A sensor word; `None` is a damaged or missing one.
 pub(crate) type Word = Option<Pressure>;
@@ -34,22 +32,7 @@ pub(crate) const WORDS: usize = 128;
 
 /// The timer's clock, and that of the bus before it is divided: both 84 MHz.
 const TIMER_HZ: u32 = 84_000_000;
-/// The bus: the fastest clock that all parts of the finger can be read with. It is divided by 2 to this power, and 2.
-const DIVIDER: u8 = {
-    let (mut divider, mut ports) = (0, Finger::PORTS);
-    while let [port, others @ ..] = ports {
-        while TIMER_HZ >> (divider + 1) > *port.clock_hz.end() {
-            divider += 1;
-        }
-        ports = others;
-    }
-    divider
-};
-const SPI_HZ: u32 = TIMER_HZ >> (DIVIDER + 1);
-/// Cycles of the core, 168 MHz, in a byte.
-const BYTE_CYCLES: u32 = 8 * (2 * TIMER_HZ / SPI_HZ);
-/// Ticks of the timer in a byte.
-const BYTE_TICKS: u32 = BYTE_CYCLES / 2;
+/// Ticks of the timer in a us; the core makes two cycles in each.
 const US_TICKS: u32 = TIMER_HZ / 1_000_000;
 /// 84 MHz / 19 091: 4399.98 slots a second.
 const SLOT_TICKS: u32 = (TIMER_HZ + SLOTS_HZ / 2) / SLOTS_HZ;
@@ -60,41 +43,53 @@ const SLACK_US: u32 = 7;
 /// Alternate function of SPI1's pins (data sheet, table 12).
 const SPI1_FUNCTION: u8 = 5;
 /// Chip selects: the board has two.
-const SELECTS: usize = Finger::PORTS.len();
-/// Whether all parts want the same mode of the bus: then it is set up once.
-const ONE_MODE: bool = {
-    let (mut one, mut ports) = (true, Finger::PORTS);
-    while let [port, others @ ..] = ports {
-        one &= port.mode_number() == Finger::PORTS[0].mode_number();
-        assert!(*port.clock_hz.start() <= SPI_HZ && SPI_HZ <= *port.clock_hz.end());
-        ports = others;
-    }
-    one
-};
+const SELECTS: usize = 2;
 /// CPOL and CPHA are the number of the mode, at the low end of CR1 (RM0090 28.5.1).
 const MODE: u32 = 0b11;
 
-/// Whether all transactions have an even number of bytes, so that frames can be of two. One interrupt is then enough for two bytes.
-const WIDE: bool = {
-    let (mut even, mut slots) = (true, Finger::SLOTS);
-    while let [slot, others @ ..] = slots {
-        let mut rest = *slot;
-        while let [transaction, others @ ..] = rest {
-            even &= transaction.out.len().is_multiple_of(2) && !transaction.out.is_empty();
-            assert!(
-                (transaction.port as usize) < SELECTS,
-                "there is no such chip select"
-            );
-            rest = others;
+/// The clock of a bus, by the power of two that it is divided by, less one.
+#[derive(Clone, Copy)]
+struct Clock(u8);
+
+impl Clock {
+    /// The fastest one up to this, Hz.
+    const fn up_to(hz: u32) -> Self {
+        let mut divider = 0;
+        while TIMER_HZ >> (divider + 1) > hz {
+            divider += 1;
         }
-        let byte_ns = 8 * 1_000_000_000_u64.div_ceil(SPI_HZ as u64) as u32;
-        let us = length_us(slot, byte_ns, SLACK_US);
-        assert!(us <= 1_000_000 / SLOTS_HZ, "a slot is too long");
-        slots = others;
+        Self(divider)
     }
-    even
-};
-const FRAME_BYTES: usize = if WIDE { 2 } else { 1 };
+
+    /// The fastest one that all parts of a finger can be read with.
+    const fn of(parts: &FingerParts) -> Self {
+        let (mut fastest, mut ports) = (u32::MAX, parts.ports);
+        while let [port, others @ ..] = ports {
+            let most = *port.clock_hz.end();
+            fastest = if most < fastest { most } else { fastest };
+            ports = others;
+        }
+        let clock = Self::up_to(fastest);
+        let mut ports = parts.ports;
+        while let [port, others @ ..] = ports {
+            assert!(*port.clock_hz.start() <= clock.hz());
+            ports = others;
+        }
+        clock
+    }
+
+    const fn hz(self) -> u32 {
+        TIMER_HZ >> (self.0 + 1)
+    }
+
+    /// Ticks of the timer in a byte.
+    const fn byte_ticks(self) -> u32 {
+        8 << (self.0 + 1)
+    }
+}
+
+/// The clock while the finger is looked for and started: all parts of all fingers can be read with it.
+const START_CLOCK: Clock = Clock::up_to(SLOWEST_HZ);
 
 /// A transaction as the interrupts do it. The board test `slots` plants mistakes in it, by this layout.
 #[derive(Clone, Copy)]
@@ -113,65 +108,108 @@ struct Step {
     mode: u8,
 }
 
+/// Slots until all begins again, transactions of a slot, and frames of a transaction, of any finger.
+const SLOTS_AT_MOST: usize = 4;
+const STEPS: usize = 2;
+const FRAMES: usize = 3;
+
 impl Step {
-    const fn of(transaction: &Transaction) -> Self {
+    const NOTHING: Self = Self {
+        ticks: 0,
+        gap_ticks: 0,
+        out: [0; FRAMES],
+        port: 0,
+        bytes: 0,
+        answer: 0,
+        mode: 0,
+    };
+
+    const fn of(transaction: &Transaction, parts: &FingerParts, clock: Clock, wide: bool) -> Self {
         let (mut out, mut index, mut rest) = ([0; FRAMES], 0, transaction.out);
         while let [byte, others @ ..] = rest {
-            out[index / FRAME_BYTES] = out[index / FRAME_BYTES] << 8 | *byte as u16;
+            let frame = if wide { index / 2 } else { index };
+            out[frame] = out[frame] << 8 | *byte as u16;
             (index, rest) = (index + 1, others);
         }
+        assert!(
+            (transaction.port as usize) < SELECTS,
+            "there is no such chip select"
+        );
         Self {
-            ticks: index as u32 * BYTE_TICKS + SLACK_US * US_TICKS,
+            ticks: index as u32 * clock.byte_ticks() + SLACK_US * US_TICKS,
             gap_ticks: transaction.gap_us * US_TICKS,
             out,
             port: transaction.port,
             bytes: index as u8,
             answer: index as u8 - transaction.answer,
-            mode: Finger::PORTS[transaction.port as usize].mode_number(),
+            mode: parts.ports[transaction.port as usize].mode_number(),
         }
     }
 }
 
-/// Slots, the transactions of the longest one, and the frames of the longest of these.
-const COUNT: usize = Finger::SLOTS.len();
-const STEPS: usize = most().0;
-const FRAMES: usize = most().1;
-
-const fn most() -> (usize, usize) {
-    let (mut steps, mut frames, mut slots) = (0, 0, Finger::SLOTS);
-    while let [slot, others @ ..] = slots {
-        if slot.len() > steps {
-            steps = slot.len();
-        }
-        let mut rest = *slot;
-        while let [transaction, others @ ..] = rest {
-            let these = transaction.out.len().div_ceil(FRAME_BYTES);
-            frames = if these > frames { these } else { frames };
-            rest = others;
-        }
-        slots = others;
-    }
-    (steps, frames)
+/// What is done in the slots of a finger.
+#[repr(C)]
+struct Plan {
+    /// Each slot: its transactions, and how many of them there are.
+    slots: [(usize, [Step; STEPS]); SLOTS_AT_MOST],
+    /// The slots that there are, less one: their number is a power of two.
+    mask: usize,
+    /// Whether all transactions have an even number of bytes, so that frames are of two. One interrupt is then enough for two bytes.
+    wide: bool,
+    /// Whether the parts want different modes of the bus: otherwise it is set up once.
+    modes: bool,
+    clock: Clock,
 }
 
-/// What is done in each slot, in RAM: without the data cache (see `board`) each constant that is read from flash takes six cycles
-/// more, and a slot reads twenty of them.
+impl Plan {
+    const fn of(parts: &FingerParts) -> Self {
+        let clock = Clock::of(parts);
+        let (mut wide, mut slots) = (true, parts.slots);
+        while let [slot, others @ ..] = slots {
+            let mut rest = *slot;
+            while let [transaction, others @ ..] = rest {
+                assert!(!transaction.out.is_empty());
+                wide &= transaction.out.len().is_multiple_of(2);
+                rest = others;
+            }
+            let byte_ns = 8 * 1_000_000_000_u64.div_ceil(clock.hz() as u64) as u32;
+            let us = length_us(slot, byte_ns, SLACK_US);
+            assert!(us <= 1_000_000 / SLOTS_HZ, "a slot is too long");
+            slots = others;
+        }
+        let mut plan = Self {
+            slots: [(0, [Step::NOTHING; STEPS]); SLOTS_AT_MOST],
+            mask: parts.slots.len() - 1,
+            wide,
+            modes: false,
+            clock,
+        };
+        assert!(parts.slots.len().is_power_of_two());
+        let mut at = 0;
+        while at < parts.slots.len() {
+            let slot = parts.slots[at];
+            let mut step = 0;
+            while step < slot.len() {
+                plan.slots[at].1[step] = Step::of(&slot[step], parts, clock, wide);
+                plan.modes |= plan.slots[at].1[step].mode != plan.slots[0].1[0].mode;
+                step += 1;
+            }
+            plan.slots[at].0 = step;
+            at += 1;
+        }
+        plan
+    }
+}
+
+/// What is done in each slot of each finger, in RAM: without the data cache (see `board`) each constant that is read from flash takes
+/// six cycles more, and a slot reads twenty of them. Board tests look for this name.
+#[unsafe(no_mangle)]
 #[unsafe(link_section = ".data.SLOT_PLAN")]
-static SLOT_PLAN: [(usize, [Step; STEPS]); COUNT] = {
-    let nothing = Step::of(&Transaction::first_port(&[], 0, 0));
-    let (mut plan, mut at) = ([(0, [nothing; STEPS]); COUNT], 0);
-    while at < COUNT {
-        let slot = Finger::SLOTS[at];
-        let mut step = 0;
-        while step < slot.len() {
-            plan[at].1[step] = Step::of(&slot[step]);
-            step += 1;
-        }
-        plan[at].0 = step;
-        at += 1;
-    }
-    plan
-};
+static SLOT_PLAN: [Plan; FingerName::ALL.len()] = [
+    Plan::of(FingerName::ALL[0].parts()),
+    Plan::of(FingerName::ALL[1].parts()),
+    Plan::of(FingerName::ALL[2].parts()),
+];
 
 /// Slots since boot, those that came too late, and words by what was wrong with them.
 pub(crate) static SLOTS: AtomicU32 = AtomicU32::new(0);
@@ -189,6 +227,7 @@ pub(crate) struct Bus {
     _pins: [ManuallyDrop<Flex<'static>>; 3],
     selects: [Select; SELECTS],
     control: Cr1,
+    clock: Clock,
     /// It was told to say when a frame is over.
     interrupts: bool,
 }
@@ -197,11 +236,8 @@ pub(crate) struct Bus {
 const LOOKS: u32 = 32;
 
 impl Bus {
-    /// Takes the bus; no select is low.
+    /// Takes the bus; no select is low. It is slow enough for all parts, and its frames are bytes.
     pub(crate) fn new(pins: board::Sensor) -> Self {
-        #[cfg(not(feature = "finger-mems"))]
-        let selects = [Select::new(pins.select.into())];
-        #[cfg(feature = "finger-mems")]
         let selects = [
             Select::new(pins.select.into()),
             Select::new(pins.select_2.into()),
@@ -213,12 +249,7 @@ impl Bus {
         for (pin, how) in led.iter_mut().zip([out, out, input]) {
             pin.set_as_af_unchecked(SPI1_FUNCTION, how);
         }
-        let mut control = Cr1(if let [port, ..] = Finger::PORTS {
-            port.mode_number().into()
-        } else {
-            0
-        });
-        control.set_br(Br::from_bits(DIVIDER));
+        let mut control = Cr1::default();
         control.set_mstr(Mstr::MASTER);
         // selects are by software: no mode fault
         control.set_ssm(true);
@@ -229,10 +260,32 @@ impl Bus {
             _pins: led,
             selects,
             control,
+            clock: START_CLOCK,
             interrupts: false,
         };
-        bus.restart();
+        bus.set_clock(START_CLOCK);
         bus
+    }
+
+    /// As fast as the finger's parts can be read, for who reads its slots without interrupts.
+    pub(crate) fn speed_up(&mut self, parts: &FingerParts) {
+        self.set_clock(Clock::of(parts));
+    }
+
+    fn set_clock(&mut self, clock: Clock) {
+        self.clock = clock;
+        self.control.set_br(Br::from_bits(clock.0));
+        self.restart();
+    }
+
+    /// Has the bus say when each frame of these slots is over.
+    fn begin(&mut self, plan: &Plan) {
+        self.interrupts = true;
+        self.control
+            .set_dff(if plan.wide { Dff::BITS16 } else { Dff::BITS8 });
+        let [(_, [step, ..]), ..] = &plan.slots;
+        self.control.0 |= u32::from(step.mode);
+        self.set_clock(plan.clock);
     }
 
     /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no word.
@@ -241,8 +294,7 @@ impl Bus {
             select.set(false);
         }
         rcc::enable_and_reset::<peripherals::SPI1>();
-        SPI1.cr2()
-            .write_value(spi::second_control(self.interrupts, self.is_wide()));
+        SPI1.cr2().write(|w| w.set_rxneie(self.interrupts));
         SPI1.cr1().write_value(self.control);
     }
 
@@ -253,38 +305,21 @@ impl Bus {
         }
     }
 
-    /// Sets the bus to a mode, by its number, where the parts differ in it; no select is low, and no frame under way (RM0090 28.5.1).
+    /// Sets the bus to a mode, by its number; no select is low, and no frame under way (RM0090 28.5.1).
     #[inline(always)]
     fn set_mode(&mut self, mode: u8) {
-        if !ONE_MODE {
-            SPI1.cr1()
-                .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
-        }
-    }
-
-    /// Frames are bytes as long as nobody has begun the slots.
-    fn is_wide(&self) -> bool {
-        WIDE && self.interrupts
-    }
-
-    /// Sends a frame, see [`spi::send`].
-    fn send(&mut self, frame: u16) {
-        spi::send(SPI1, frame, self.is_wide());
-    }
-
-    /// The bytes of a frame that is over, in the last places.
-    fn received(&mut self) -> [u8; 2] {
-        spi::received(SPI1, self.is_wide()).to_be_bytes()
+        SPI1.cr1()
+            .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
     }
 
     /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes the place of
     /// `bytes`.
     pub(crate) fn transact(
         &mut self,
+        port: Option<&Port>,
         transaction: &Transaction,
         bytes: &mut [u8],
     ) -> Result<(), NoFrame> {
-        let port = Finger::PORTS.get(usize::from(transaction.port));
         self.set_mode(port.map_or(0, Port::mode_number));
         self.select(transaction.port, true);
         let done = bytes.iter_mut().all(|byte| self.wait_for_byte(byte));
@@ -297,14 +332,15 @@ impl Bus {
     }
 
     fn wait_for_byte(&mut self, byte: &mut u8) -> bool {
-        self.send((*byte).into());
-        chip::wait_cycles(BYTE_CYCLES);
+        let byte_cycles = 2 * self.clock.byte_ticks();
+        spi::send(SPI1, (*byte).into());
+        chip::wait_cycles(byte_cycles);
         for _ in 0..2 * LOOKS {
             if SPI1.sr().read().rxne() {
-                [_, *byte] = self.received();
+                [_, *byte] = spi::received(SPI1).to_be_bytes();
                 return true;
             }
-            chip::wait_cycles(BYTE_CYCLES / LOOKS);
+            chip::wait_cycles(byte_cycles / LOOKS);
         }
         false
     }
@@ -314,7 +350,8 @@ impl Bus {
 struct Slots {
     bus: Bus,
     _timer: Peri<'static, peripherals::TIM2>,
-    finger: Finger,
+    finger: AnyFinger,
+    plan: &'static Plan,
     words: Producer<'static, Word>,
     /// Words were lost: who takes them sees where, as the next one is no good.
     gap: bool,
@@ -362,25 +399,28 @@ pub(crate) fn unreadable() -> u32 {
     parity.wrapping_add(ERROR_FRAMES.load(Relaxed))
 }
 
-/// Gravity along the finger, see [`PressureSensor::gravity`]; beyond all of it before it is known.
+/// Gravity along the finger, see [`AnyFinger::gravity`]; beyond all of it before it is known.
 static GRAVITY: AtomicI32 = AtomicI32::new(i32::MIN);
 
 /// Gravity along the finger, counts of P_AC.
 pub(crate) fn gravity() -> Option<f32> {
     let parts = GRAVITY.load(Relaxed);
-    (Finger::FEELS_GRAVITY && parts > i32::MIN).then_some(parts as f32 / GRAVITY_PARTS)
+    (parts > i32::MIN).then_some(parts as f32 / GRAVITY_PARTS)
 }
 
 /// Begins the slots; to be called once, when the sensor has started. `interrupt`s of SPI1 and TIM2 have one priority.
 pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, Word>) {
-    bus.interrupts = true;
-    spi::set_width(&mut bus.control, WIDE);
-    bus.restart();
+    let name = finger::name();
+    let Some(plan) = SLOT_PLAN.get(name as usize) else {
+        return;
+    };
+    bus.begin(plan);
     rcc::enable_and_reset::<peripherals::TIM2>();
     let slots = Slots {
         bus,
         _timer: timer.timer,
-        finger: Finger::default(),
+        finger: AnyFinger::new(name),
+        plan,
         words,
         gap: false,
         begun: 0,
@@ -440,13 +480,19 @@ fn SPI1() {
 }
 
 impl Slots {
+    #[inline(always)]
+    fn frame_bytes(&self) -> usize {
+        1 << u32::from(self.plan.wide)
+    }
+
     /// A slot begins.
     #[inline(always)]
     fn begin(&mut self) {
         if let [step, ..] = self.left {
             self.give_up(step);
         }
-        if let Some((steps, all)) = SLOT_PLAN.get(self.begun as usize % COUNT) {
+        let slot = self.begun as usize & self.plan.mask;
+        if let Some((steps, all)) = self.plan.slots.get(slot) {
             self.left = all.get(..*steps).unwrap_or_default();
         }
         self.begun = self.begun.wrapping_add(1);
@@ -489,10 +535,13 @@ impl Slots {
         let [step, left @ ..] = self.left else {
             return;
         };
-        self.bus.set_mode(step.mode);
+        if self.plan.modes {
+            self.bus.set_mode(step.mode);
+        }
         self.bus.select(step.port, true);
-        self.bus.send(step.out.first().copied().unwrap_or_default());
-        self.sent = FRAME_BYTES;
+        let [first, ..] = step.out;
+        spi::send(SPI1, first);
+        self.sent = self.frame_bytes();
         self.ends = self.begins + step.ticks;
         if !left.is_empty() {
             self.begins = self.ends + step.gap_ticks;
@@ -506,20 +555,21 @@ impl Slots {
     /// A frame is over.
     #[inline(always)]
     fn frame(&mut self) {
-        let came_in = self.bus.received();
+        let came_in = spi::received(SPI1).to_be_bytes();
+        let frame_bytes = self.frame_bytes();
         let [step, left @ ..] = self.left else {
             return;
         };
         // the answer begins with a frame, or in the middle of one
-        let before = (usize::from(step.answer) + FRAME_BYTES).saturating_sub(self.sent);
-        for byte in came_in.iter().skip(2 - FRAME_BYTES + before) {
+        let before = (usize::from(step.answer) + frame_bytes).saturating_sub(self.sent);
+        for byte in came_in.iter().skip(2 - frame_bytes + before) {
             // there is room for the answers of a slot
             let _ = self.answer.push(*byte);
         }
         if self.sent < step.bytes.into() {
-            let frame = step.out.get(self.sent / FRAME_BYTES);
-            self.bus.send(frame.copied().unwrap_or_default());
-            self.sent += FRAME_BYTES;
+            let frame = step.out.get(self.sent >> u32::from(self.plan.wide));
+            spi::send(SPI1, frame.copied().unwrap_or_default());
+            self.sent += frame_bytes;
             return;
         }
         self.bus.select(step.port, false);
@@ -556,7 +606,7 @@ impl Slots {
 
     #[cold]
     fn damaged(&mut self, why: &FingerError) {
-        if let Some(kind) = Finger::kind(why) {
+        if let Some(kind) = why.kind() {
             let counter = match kind {
                 BadWord::Garbled => &PARITY,
                 BadWord::Refused | BadWord::Silent => &ERROR_FRAMES,

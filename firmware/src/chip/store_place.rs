@@ -1,7 +1,7 @@
 //! Where the store is: the first six sectors of bank 2, four of 16 KB, one of 64, one of 128.
 use embassy_stm32::flash::{Error, FLASH_BASE};
 
-/// The store in the chip's memory: board.x, STORE.
+/// The store in the chip's memory: memory.x, STORE.
 pub(super) const STORE_AT: usize = 0x0810_0000;
 pub(super) const STORE_LENGTH: usize = 256 * 1024;
 /// The same from the flash's first byte on.

@@ -128,7 +128,7 @@ pub(super) async fn serve(
     };
     line.answer(hello.clone()).await;
     let pins = pins(&mut r);
-    let mut touch = Touch::new(Sensor::new(r.sensor).await, 0.0);
+    let mut touch = Touch::new(Sensor::new(r.sensor, reset).await, 0.0);
     let mut motors = Motors::new(r.lever, r.stage, r.current, r.switches);
     let mut squeezed = false;
     let mut store = None;

@@ -9,22 +9,22 @@ use embassy_time::Timer;
 use heapless::Vec;
 use tactus_core::rig::lever::{APPROACH_STEPS_S, MAX_STEPS, RETRACT_STEPS_S};
 use tactus_core::rig::stage::StageConstants;
-use tactus_core::sensor::PressureSensor as _;
 use tactus_core::wire::bringup::limits::{CURRENT_ZERO, LEVER_PLAY, WEAK_A};
 use tactus_core::wire::bringup::{MAX_POINTS, Stopped};
 
 use super::account::wait_us;
 use super::sensor::{Spread, Touch};
-use crate::board::{self, Finger};
+use crate::board;
 use crate::chip::current::{self, Current};
+use crate::chip::finger;
 use crate::chip::lever::Lever;
 
 /// Rings of conversions at rest: a thousand of them.
 pub(super) const AT_REST: u32 = 40;
 /// 2 mm of the lever.
 pub(super) const LEVER_STEPS: i32 = 3200;
-/// P_DC has risen by so much when the lever presses the finger, counts.
-const PRESSED_COUNTS: f32 = Finger::MODEL.counts(92.0);
+/// P_DC has risen by so much when the lever presses the finger, mN.
+const PRESSED_MN: f32 = 92.0;
 /// About 36 mm/s: enough to overcome friction, slow enough to stop by hand.
 const STAGE_DUTY: f32 = 0.08;
 const STAGE_MM: f32 = 1.0;
@@ -205,7 +205,7 @@ impl Motors {
                     if ms % LEVER_POINT_MS == 0 {
                         self.note(self.lever.steps() as f32 / 4.0, rise * 16.0);
                     }
-                    if rise >= PRESSED_COUNTS {
+                    if rise >= finger::parts().model.counts(PRESSED_MN) {
                         break Err(Stopped::Pressed);
                     }
                 }

@@ -3,14 +3,14 @@ use embassy_time::{Duration, Instant, Timer};
 use tactus_core::sensor::biotac::{IdentityBytes, keep};
 use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{self, Answer, Transaction, Unexpected};
-use tactus_core::sensor::{BadWord, FingerName, PressureSensor as _, slot_of};
+use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerName};
 use tactus_core::wire::bringup::{Stopped, limits};
-use tactus_core::wire::{Text, text};
+use tactus_core::wire::{Reset, Text, text};
 
 use super::account::{Account, wait_us};
-use crate::board::{self, Finger};
-use crate::chip::slots::{Bus, FingerError};
-use crate::tasks::acquire;
+use crate::board;
+use crate::chip::finger;
+use crate::chip::slots::Bus;
 
 /// The slot that gives P_DC.
 const PDC: u32 = 1;
@@ -19,9 +19,8 @@ const LATE_US: u64 = 100;
 /// Slots in which a finger that has just begun fills its filters.
 const FILLS: u32 = 16;
 
-/// The finger is squeezed, and a squeeze is over, counts of P_DC.
-const SQUEEZED_COUNTS: f32 = Finger::MODEL.counts(limits::SQUEEZED_MN);
-const LEFT_COUNTS: f32 = Finger::MODEL.counts(57.5);
+/// A squeeze is over, mN.
+const LEFT_MN: f32 = 57.5;
 /// The finger lies still for so long, ms, and so long the squeeze is waited for.
 const LEFT_MS: u32 = 500;
 const ASKED_MS: u32 = 30_000;
@@ -31,26 +30,33 @@ const MOST_DAMAGED: u32 = 10;
 /// The bus of the sensor, used directly.
 pub(super) struct Sensor {
     bus: Bus,
-    finger: Finger,
+    finger: AnyFinger,
+    /// Whether a finger answered, and why its parts did not start.
+    found: bool,
     started: Result<(), Unexpected>,
 }
 
 impl Sensor {
-    /// Takes the bus, waits until the sensor is up, and starts its parts.
-    pub(super) async fn new(pins: board::Sensor) -> Self {
+    /// Takes the bus, waits until the sensor is up, finds out which one it is, and starts its parts.
+    pub(super) async fn new(pins: board::Sensor, reset: Reset) -> Self {
         let mut bus = Bus::new(pins);
-        Timer::after_millis(Finger::POWER_UP_MS.into()).await;
+        let found = finger::find_at_boot(&mut bus, reset).await;
+        let started = finger::start(&mut bus);
+        bus.speed_up(finger::parts());
         Self {
-            started: acquire::parts(&mut bus),
+            found,
+            started,
             bus,
-            finger: Finger::default(),
+            finger: AnyFinger::new(finger::name()),
         }
     }
 
     /// The answer to transactions; nothing if the bus is off.
     fn perform(&mut self, transactions: &[Transaction]) -> Answer {
+        let ports = finger::parts().ports;
         let answer = slot::perform(transactions, |transaction, bytes| {
-            let done = self.bus.transact(transaction, bytes);
+            let port = ports.get(usize::from(transaction.port));
+            let done = self.bus.transact(port, transaction, bytes);
             wait_us(transaction.gap_us);
             done
         });
@@ -59,10 +65,13 @@ impl Sensor {
 
     /// Who it is: a BioTac says it, other fingers have parts that answered as they must.
     pub(super) fn identity(&mut self) -> Result<Text, Text> {
-        let name = Finger::MODEL.name;
+        if !self.found {
+            return Err(text("no finger answers"));
+        }
+        let (name, ports) = (finger::name(), finger::parts().ports);
         if name != FingerName::Biotac {
             let started = self.started.map_err(text);
-            return started.map(|()| text(format_args!("{name}, {} parts", Finger::PORTS.len())));
+            return started.map(|()| text(format_args!("{name}, {} parts", ports.len())));
         }
         let mut bytes = IdentityBytes::default();
         for (transactions, place) in bytes.reads() {
@@ -76,7 +85,7 @@ impl Sensor {
     }
 
     fn word(&mut self, slot: u32) -> (Result<Pressure, FingerError>, Answer) {
-        let answer = self.perform(slot_of::<Finger>(slot));
+        let answer = self.perform(finger::parts().slot(slot));
         (self.finger.decode(slot, &answer), answer)
     }
 
@@ -106,7 +115,7 @@ impl Sensor {
                     each(pressure);
                 }
                 Err(why) => {
-                    match Finger::kind(&why) {
+                    match why.kind() {
                         Some(BadWord::Garbled) => second.garbled += 1,
                         Some(BadWord::Refused) => second.refused += 1,
                         Some(BadWord::Silent) => second.silent += 1,
@@ -214,12 +223,15 @@ impl Touch {
 
     /// Waits for somebody who squeezes the finger and lays it down: then P_DC lives, and its rest is known.
     pub(super) async fn squeezed(&mut self) -> Result<(), Stopped> {
+        let model = &finger::parts().model;
+        let squeezed_counts = model.counts(limits::SQUEEZED_MN);
+        let left_counts = model.counts(LEFT_MN);
         let (mut squeezed, mut left_ms) = (false, 0);
         for _ in 0..ASKED_MS {
             Timer::after_millis(1).await;
             let rise = self.rise()?;
-            squeezed |= rise > SQUEEZED_COUNTS;
-            left_ms = if squeezed && rise.abs() < LEFT_COUNTS {
+            squeezed |= rise > squeezed_counts;
+            left_ms = if squeezed && rise.abs() < left_counts {
                 left_ms + 1
             } else {
                 0
@@ -233,8 +245,8 @@ impl Touch {
     }
 }
 
-pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch {
-    let mut sensor = Sensor::new(pins).await;
+pub(super) async fn sensor(pins: board::Sensor, reset: Reset, account: &mut Account) -> Touch {
+    let mut sensor = Sensor::new(pins, reset).await;
     let (answers, who) = match sensor.identity() {
         Ok(who) => (true, who),
         Err(why) => (false, why),
@@ -265,7 +277,7 @@ pub(super) async fn sensor(pins: board::Sensor, account: &mut Account) -> Touch 
         ),
         "Shorten the cable and check the pins named above",
     );
-    let at_rest = Finger::MODEL.at_rest;
+    let at_rest = finger::parts().model.at_rest;
     let mut rests = |name, is: f32, (least, most): (f32, f32), remedy| {
         let within = (least..=most).contains(&is);
         account.check(

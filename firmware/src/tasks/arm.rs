@@ -14,14 +14,13 @@ use tactus_core::probe::servo_rig::Samples;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::over_link::RigOverLink;
 use tactus_core::rig::pins::{Inputs, MAX_WORDS};
-use tactus_core::sensor::PressureSensor as _;
 use tactus_core::wire::{ArmOrder, ArmReport, Event};
 
-use super::drive::{self, ANSWER, COMMAND, ENDED, HEARD, LOST, REPORTS, STATE, STOP, UNMEASURED};
+use super::drive::{self, ANSWER, COMMAND, ENDED, HEARD, LOST, REPORTS, STATE, STOP, unmeasured};
 use super::outbox::tell;
-use crate::board::{self, Finger};
+use crate::board;
 use crate::chip::slots::Word;
-use crate::chip::{rescue, watchdog};
+use crate::chip::{finger, rescue, watchdog};
 
 static ORDER: Signal<CriticalSectionRawMutex, ArmOrder> = Signal::new();
 
@@ -43,8 +42,11 @@ pub(crate) async fn arm(
 ) {
     // low from power-up on, and when this chip does nothing any more
     let mut permission = Output::new(permission.enable, Level::Low, Speed::Low);
+    // the watchdog of the start leaves time for it
+    finger::found().await;
     watchdog::tighten(watchdog);
-    let mut rig = RigOverLink::new(&Finger::MODEL, UNMEASURED, Unguarded::default());
+    let model = &finger::parts().model;
+    let mut rig = RigOverLink::new(model, unmeasured(finger::name()), Unguarded::default());
     let (mut ended, mut hung, mut remembered) = (None, None, false);
     let mut ticker = Ticker::every(Duration::from_millis(1));
     loop {

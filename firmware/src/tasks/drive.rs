@@ -8,20 +8,16 @@ use embassy_executor::InterruptExecutor;
 use embassy_stm32::interrupt;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-#[cfg(feature = "arm")]
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use tactus_core::probe::RigState;
 use tactus_core::probe::servo_rig::RigCommand;
 use tactus_core::rig::Refused;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::table::EARLY;
-#[cfg(feature = "arm")]
+use tactus_core::sensor::FingerName;
 use tactus_core::wire::ArmReport;
 
 use super::link::Body;
-use crate::board::Finger;
 
 /// Runs the task that drives the rig, and nothing else.
 pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
@@ -46,7 +42,7 @@ pub(super) static END_SLIDE: AtomicBool = AtomicBool::new(false);
 /// The session was told to stop: between two movements the rig has nothing to stop.
 static STOPPED: AtomicBool = AtomicBool::new(false);
 pub(super) static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
-    Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
+    Mutex::new(Cell::new(RigState::parked(unmeasured(FingerName::Biotac))));
 /// Samples dropped because the queue to the probe was full, or without a current of their own.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
@@ -57,22 +53,22 @@ static STUCK_MS: AtomicU32 = AtomicU32::new(0);
 const WAITS: u32 = u32::MAX;
 
 /// Words of an arm between two ticks: it says one in 50 ms.
-#[cfg(feature = "arm")]
 pub(super) const REPORTS: usize = 8;
 /// What the arm has said; what has no room is said again.
-#[cfg(feature = "arm")]
 pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
 /// The reference rig's constants, until measured ones are read from the store.
-pub(crate) const UNMEASURED: RigCalibration = RigCalibration {
-    pressure: Finger::MODEL.calibration,
-    unloaded_a: (0.037, 0.0),
-    newton_per_ampere: 16.4,
-    date: 0,
-    air_known: false,
-    turned: 0,
-    serial: [0; 16],
-};
+pub(crate) const fn unmeasured(finger: FingerName) -> RigCalibration {
+    RigCalibration {
+        pressure: finger.parts().model.calibration,
+        unloaded_a: (0.037, 0.0),
+        newton_per_ampere: 16.4,
+        date: 0,
+        air_known: false,
+        turned: 0,
+        serial: [0; 16],
+    }
+}
 
 /// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid, is
 /// half of it.
@@ -96,7 +92,7 @@ pub(crate) fn stop() {
 
 /// Ends the slide that is being made, if one is.
 pub(crate) fn end_slide() {
-    END_SLIDE.store(EARLY, Relaxed);
+    END_SLIDE.store(true, Relaxed);
 }
 
 /// Stops what is being done, and what would come after it until [`forget_stop`].
@@ -125,7 +121,9 @@ pub(crate) async fn ended() {
     ENDED.wait().await;
 }
 
-/// The tasks in thread mode are alive.
+/// The tasks in thread mode are alive. Board tests break it by its name.
+#[unsafe(export_name = "tactus_check_in")]
+#[inline(never)]
 pub(crate) fn check_in() {
     SILENT_MS.store(0, Relaxed);
 }
@@ -140,7 +138,9 @@ pub(crate) fn waits() {
     STUCK_MS.store(WAITS, Relaxed);
 }
 
-/// Another millisecond: why the tasks that the rig serves are taken for hung, if they are.
+/// Another millisecond: why the tasks that the rig serves are taken for hung, if they are. Board tests break it by its name.
+#[unsafe(export_name = "tactus_servo_tick")]
+#[inline(never)]
 pub(super) fn hung() -> Option<&'static str> {
     let silent_ms = SILENT_MS.fetch_add(1, Relaxed);
     // thread mode does not come between: the servo interrupts it
@@ -157,13 +157,21 @@ pub(super) fn hung() -> Option<&'static str> {
     }
 }
 
-/// The servo as the link asks it at any time.
-pub(crate) static BODY: Body = Body {
+/// The rig as the link asks it at any time.
+pub(crate) static BODY: Body = MOVED_BY_MOTORS;
+const MOVED_BY_MOTORS: Body = Body {
     state,
     stop: |all| if all { stop_for_good() } else { stop() },
     lost: || LOST.load(Relaxed),
-    #[cfg(feature = "arm")]
+    arm: |_| false,
+};
+
+/// The same where somebody else's arm moves the finger.
+pub(crate) static BODY_ON_ARM: Body = Body {
     arm: |report| {
+        // what has no room is said again
         let _ = HEARD.try_send(report);
+        true
     },
+    ..MOVED_BY_MOTORS
 };

@@ -15,28 +15,26 @@ use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
 use tactus_core::handheld::jobs::{self, Outcome};
-use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, Small, TICKS_HZ, draw};
+use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
 use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::PressureSensor as _;
+use tactus_core::sensor::FingerName;
 use tactus_core::sensor::paa5100je::{MotionFault, Paa5100je};
-use tactus_core::table::{PACED, factory};
-use tactus_core::wire::{Event, PROTOCOL, Reset, Text};
+use tactus_core::table::factory;
+use tactus_core::wire::{Event, Reset, Text};
 
 use super::display;
 use super::level::OneLevel;
 use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
 use super::outbox::{self, STREAM};
-use crate::board::{self, Finger};
+use crate::board;
 use crate::chip::flash::{self, MappedTable};
 use crate::chip::motion::MotionBus;
 use crate::chip::slots::{self, Word};
 use crate::chip::watchdog;
+use crate::chip::{Chip, finger};
 
-/// The table that comes with the handheld: textures of a simulated world under a simulated hand. Its
-/// whitening says how slides of one texture by hand differ; the user trains a real probe.
-static FACTORY: &[u8] = factory::handheld(Finger::MODEL.name);
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
 /// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest sector,
@@ -149,7 +147,8 @@ fn sound(buzzer: &mut Buzzer, tone: Option<u16>) {
 }
 
 /// So the probe is, for who asks at any time.
-static STATE: Mutex<OneLevel, Cell<RigState>> = Mutex::new(Cell::new(RigState::parked(UNMEASURED)));
+static STATE: Mutex<OneLevel, Cell<RigState>> =
+    Mutex::new(Cell::new(RigState::parked(unmeasured(FingerName::Biotac))));
 /// The host stopped what it asked for.
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
@@ -158,20 +157,21 @@ pub(crate) static BODY: Body = Body {
     state: || STATE.lock(Cell::get),
     stop: |all| STOPPED.store(all, Relaxed),
     lost: || 0,
-    #[cfg(feature = "arm")]
-    arm: |_| (),
+    arm: |_| false,
 };
 
 /// A fingertip that nobody has measured; what belongs to motors is not used.
-const UNMEASURED: RigCalibration = RigCalibration {
-    pressure: Finger::MODEL.calibration,
-    unloaded_a: (0.0, 0.0),
-    newton_per_ampere: 1.0,
-    date: 0,
-    air_known: false,
-    turned: 0,
-    serial: [0; 16],
-};
+const fn unmeasured(finger: FingerName) -> RigCalibration {
+    RigCalibration {
+        pressure: finger.parts().model.calibration,
+        unloaded_a: (0.0, 0.0),
+        newton_per_ampere: 1.0,
+        date: 0,
+        air_known: false,
+        turned: 0,
+        serial: [0; 16],
+    }
+}
 
 /// The parts in the hand.
 struct Parts {
@@ -184,13 +184,15 @@ struct Parts {
     listens: bool,
     same: bool,
     ticks: u32,
-    /// The sensor of motion, in images that have one, and whether it failed when that was logged last.
-    motion: Option<Paa5100je<MotionBus>>,
+    /// The sensor of motion, and whether it failed when that was logged last.
+    motion: Paa5100je<MotionBus>,
     motion_fails: bool,
 }
 
 impl Hand for Parts {
-    const FEELS_GRAVITY: bool = Finger::FEELS_GRAVITY;
+    fn feels_gravity(&self) -> bool {
+        finger::parts().feels_gravity
+    }
 
     async fn wait(&mut self) {
         self.ticker.next().await;
@@ -207,9 +209,12 @@ impl Hand for Parts {
     }
 
     fn moved(&mut self) -> Option<Moved> {
-        // leaves the driver out of the other image
-        let sensor = self.motion.as_mut().filter(|_| PACED)?;
+        let sensor = &mut self.motion;
         let moved = sensor.poll(Instant::now().as_millis() as u32);
+        // a probe without one is asked now and then: it may be plugged in
+        if !sensor.is_found() {
+            return None;
+        }
         let fault = sensor.fault();
         if fault.is_some() != self.motion_fails {
             self.motion_fails = fault.is_some();
@@ -283,17 +288,6 @@ impl Hand for Parts {
     }
 }
 
-/// Says that the probe has booted; from thread mode, before the tasks run.
-pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
-    outbox::tell(Event::Booted {
-        protocol: PROTOCOL,
-        version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
-        reset,
-        last_words,
-        finger: board::FINGER,
-    });
-}
-
 /// Tells the host, once one has asked for something: a probe without a host saves the work.
 fn tell(event: Event) {
     if let Event::Trouble(_) = &event {
@@ -329,6 +323,7 @@ pub(crate) async fn hand(
     go: board::Go,
     motion: board::Motion,
     words: Consumer<'static, Word>,
+    booted: (Reset, Option<Text>),
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
     let plan: &'static Plan = PLAN.init_with(Plan::new);
@@ -341,12 +336,17 @@ pub(crate) async fn hand(
         Hertz(2000),
         CountingMode::EdgeAlignedUp,
     );
+    finger::found().await;
+    let (reset, last_words) = booted;
+    outbox::booted(reset, last_words);
+    // textures of a simulated world under a simulated hand; the user trains a real probe
+    let table = factory::handheld(finger::name());
     let store = flash::wait(flash::open(flash), progress).await;
     let mut events = Shown::new(Told(Output::new(go.same, Level::Low, Speed::Low)));
-    let mut memory = Memory::new(store, MappedTable, FACTORY, flash::buffer());
+    let mut memory = Memory::new(store, MappedTable, table, flash::buffer());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
-    let mut handheld = Handheld::<Small>::new(plan, textures);
+    let mut handheld = Handheld::<Chip>::new(plan, textures);
     if let Some(why) = memory.trouble() {
         handheld.memory_failed(jobs::words(why));
     }
@@ -361,11 +361,11 @@ pub(crate) async fn hand(
         listens: false,
         same: false,
         ticks: 0,
-        motion: PACED.then(|| Paa5100je::new(MotionBus::new(motion))),
+        motion: Paa5100je::new(MotionBus::new(motion)),
         motion_fails: false,
     };
     let mut probe = Probe {
-        rig: ByHand::new(parts, handheld, UNMEASURED),
+        rig: ByHand::new(parts, handheld, unmeasured(finger::name())),
         memory,
         events,
         plan,

@@ -10,14 +10,13 @@ use static_cell::ConstStaticCell;
 use tactus_core::probe::seams::Panel;
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
 use tactus_core::sensor::FingerCode;
-#[cfg(feature = "arm")]
 use tactus_core::wire::ArmReport;
 use tactus_core::wire::{Counts, Event, Receiver, Request};
 
 use super::level::OneLevel;
 use super::outbox::{self, OUTBOX, STREAM, tell};
 use crate::board::{self, Irqs};
-use crate::chip::slots;
+use crate::chip::{finger, slots};
 
 /// embassy's buffer for the line, and the longest write: a longer one would fail, and the flush after it never end.
 pub(crate) const CHUNK: usize = 256;
@@ -79,9 +78,8 @@ pub(crate) struct Body {
     pub(crate) stop: fn(bool),
     /// Samples that were lost behind the acquisition.
     pub(crate) lost: fn() -> u32,
-    /// Hears what the arm says.
-    #[cfg(feature = "arm")]
-    pub(crate) arm: fn(ArmReport),
+    /// Takes what the arm says, if one moves the finger.
+    pub(crate) arm: fn(ArmReport) -> bool,
 }
 
 #[embassy_executor::task]
@@ -89,6 +87,8 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, body: &'static Bo
     static RECEIVER: ConstStaticCell<Receiver> = ConstStaticCell::new(Receiver::new());
     let receiver = RECEIVER.take();
     let mut bytes = [0; 64];
+    // the first report says that the probe has booted, and with which finger
+    finger::found().await;
     loop {
         // a framing or overrun error costs bytes, which the CRC notices
         let Ok(length) = uart.read(&mut bytes).await else {
@@ -122,7 +122,7 @@ struct AtAnyTime(&'static Body);
 
 impl Panel for AtAnyTime {
     fn finger(&self) -> FingerCode {
-        board::FINGER
+        finger::code()
     }
 
     fn rig(&self) -> RigState {
@@ -149,9 +149,8 @@ impl Panel for AtAnyTime {
         (self.0.stop)(all);
     }
 
-    #[cfg(feature = "arm")]
-    fn arm(&mut self, report: ArmReport) {
-        (self.0.arm)(report);
+    fn arm(&mut self, report: ArmReport) -> bool {
+        (self.0.arm)(report)
     }
 
     fn stream(&mut self, on: bool) {

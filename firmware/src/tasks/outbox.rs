@@ -3,9 +3,10 @@ use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::Relaxed};
 
 use embassy_sync::pipe::Pipe;
 use embassy_time::Instant;
-use tactus_core::wire::{self, Event, MAX_FRAME, Report};
+use tactus_core::wire::{self, Event, MAX_FRAME, PROTOCOL, Report, Reset, Text};
 
 use super::level::OneLevel;
+use crate::chip::finger;
 
 /// What is on its way to the host: 66 ms of the line.
 const OUT: usize = 6144;
@@ -15,6 +16,17 @@ static NUMBER: AtomicU16 = AtomicU16::new(0);
 pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
 /// Raw samples are wanted.
 pub(crate) static STREAM: AtomicBool = AtomicBool::new(false);
+
+/// Says that the probe has booted, and with which finger.
+pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
+    tell(Event::Booted {
+        protocol: PROTOCOL,
+        version: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
+        reset,
+        last_words,
+        finger: finger::code(),
+    });
+}
 
 /// Sends an event to the host. An event that does not fit into the outbox is dropped and counted; it leaves a gap in the
 /// numbers.

@@ -7,43 +7,68 @@ use heapless::spsc::Consumer;
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
-use tactus_core::probe::servo_rig::{Samples, Servo as _, ServoRig};
+use tactus_core::probe::servo_rig::{Samples, ServoRig};
 use tactus_core::probe::{self, Memory, Probe, TableInUse};
-use tactus_core::sensor::PressureSensor as _;
 use tactus_core::table::factory;
-use tactus_core::wire::{Event, Failure};
+use tactus_core::wire::{Event, Failure, Reset, Text};
 
 use super::drive;
 use super::link::{BUSY, JOBS, TABLE};
-use super::outbox::tell;
+use super::outbox::{self, tell};
 use super::rig_handle::ServoHandle;
-use crate::board::{self, Finger};
-use crate::chip::Chip;
+use crate::board;
 use crate::chip::flash::{self, MappedTable};
+use crate::chip::{Chip, finger};
 
-/// The table that comes with the firmware: textures of a simulated world, which suit the emulated board. A real rig
-/// is trained by its user, or receives a table from the host.
-static FACTORY: &[u8] = if cfg!(feature = "arm") {
-    factory::ARM
-} else {
-    factory::rig(Finger::MODEL.name)
-};
-/// The sensor's first words are there by now.
-const HEARD_MS: u64 = 150;
+/// The sensor's first words are there so long after it was found.
+const HEARD_MS: u64 = 50;
+
+/// Why the chip started, and what was said before.
+type Booted = (Reset, Option<Text>);
 
 #[embassy_executor::task]
 pub(crate) async fn probe(
     flash: board::Storage,
     go: board::Go,
     samples: Consumer<'static, Samples>,
+    booted: Booted,
+) {
+    work::<true>(flash, go, samples, booted).await
+}
+
+/// The same where somebody else's arm moves the finger.
+#[embassy_executor::task]
+pub(crate) async fn probe_on_arm(
+    flash: board::Storage,
+    go: board::Go,
+    samples: Consumer<'static, Samples>,
+    booted: Booted,
+) {
+    work::<false>(flash, go, samples, booted).await
+}
+
+async fn work<const HAS_STAGE: bool>(
+    flash: board::Storage,
+    go: board::Go,
+    samples: Consumer<'static, Samples>,
+    (reset, last_words): Booted,
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
-    let mut rig = ServoRig::new(ServoHandle(samples));
+    let mut rig = ServoRig::new(ServoHandle::<HAS_STAGE>(samples));
+    finger::found().await;
+    let flaw = || board::flaw()?.try_into().ok();
+    outbox::booted(reset, last_words.or_else(flaw));
+    // textures of a simulated world, which suit the emulated board; a real rig is trained by its user, or receives a table
+    let table = if HAS_STAGE {
+        factory::rig(finger::name())
+    } else {
+        factory::arm(finger::name())
+    };
     // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
     // move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
     // An arm is told to stop, and asked for more once somebody asks for a slide: it may not be there.
-    let lifted = !ServoHandle::HAS_STAGE || rig.lift().await.is_ok();
+    let lifted = !HAS_STAGE || rig.lift().await.is_ok();
     let opening = async {
         let mut store = flash::open(flash).await?;
         if let Err(why) = store.mend().await {
@@ -61,13 +86,13 @@ pub(crate) async fn probe(
     }
     let mut probe = Probe {
         rig,
-        memory: Memory::new(store, MappedTable, FACTORY, flash::buffer()),
+        memory: Memory::new(store, MappedTable, table, flash::buffer()),
         events: Told(Output::new(go.same, Level::Low, Speed::Low)),
         plan: PLAN.init_with(Plan::new),
     };
     probe.memory.reload(&mut probe.events).await;
     // a lever that does not go up must not be asked again before somebody has looked at it
-    if lifted && ServoHandle::HAS_STAGE {
+    if lifted && HAS_STAGE {
         let _ = probe.rig.home().await;
     }
     loop {

@@ -13,10 +13,10 @@ use super::outbox::{STREAM, tell};
 use crate::chip::slots;
 
 /// The probe's end of the servo.
-pub(crate) struct ServoHandle(pub(crate) Consumer<'static, Samples>);
+pub(crate) struct ServoHandle<const HAS_STAGE: bool>(pub(crate) Consumer<'static, Samples>);
 
-impl Servo for ServoHandle {
-    const HAS_STAGE: bool = cfg!(not(feature = "arm"));
+impl<const HAS_STAGE: bool> Servo for ServoHandle<HAS_STAGE> {
+    const HAS_STAGE: bool = HAS_STAGE;
 
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
         drive::command(command).await

@@ -15,14 +15,12 @@ use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::{Inputs, MAX_WORDS};
 use tactus_core::rig::stage::StageConstants;
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::table::EARLY;
 
-use super::drive::{self, ANSWER, COMMAND, END_SLIDE, ENDED, LOST, STATE, STOP, UNMEASURED};
-use crate::board::{self, Finger};
+use super::drive::{self, ANSWER, COMMAND, END_SLIDE, ENDED, LOST, STATE, STOP, unmeasured};
+use crate::board;
 use crate::chip::current::{self, Current};
 use crate::chip::slots::Word;
-use crate::chip::{lever, rescue, watchdog};
+use crate::chip::{finger, lever, rescue, watchdog};
 
 /// Without a conversion of the motor's current for so many ms the motor is not driven on.
 const NO_CURRENT_MS: u32 = 10;
@@ -74,12 +72,14 @@ pub(crate) async fn servo(
         e_stop: switch(switches.e_stop.into()),
     };
     rescue::ARMED.store(true, Relaxed);
+    // the watchdog of the start leaves time for it
+    finger::found().await;
     watchdog::tighten(watchdog);
 
     let mut control = Control::new(
-        &Finger::MODEL,
+        &finger::parts().model,
         StageConstants::REFERENCE,
-        UNMEASURED,
+        unmeasured(finger::name()),
         Unguarded::default(),
     );
     let (mut ended, mut remembered) = (None, false);
@@ -94,7 +94,7 @@ pub(crate) async fn servo(
             control.stop();
         }
         // before a command: what was to be ended is not the next one
-        if EARLY && END_SLIDE.swap(false, Relaxed) {
+        if END_SLIDE.swap(false, Relaxed) {
             control.end_slide();
         }
         if let Some(command) = COMMAND.try_take() {

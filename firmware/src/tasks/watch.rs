@@ -4,17 +4,20 @@ use tactus_core::probe::Watch;
 
 use super::drive;
 use super::outbox::tell;
+use crate::chip::finger;
 
 #[embassy_executor::task]
-pub(crate) async fn watch() {
+pub(crate) async fn watch(on_arm: bool) {
+    finger::found().await;
     let mut ticker = Ticker::every(Duration::from_millis(Watch::EVERY_MS));
     let mut watch = Watch::default();
     loop {
         ticker.next().await;
         drive::check_in();
-        #[cfg(feature = "arm")]
-        watch.look_for_arm(&drive::state(), tell);
-        #[cfg(not(feature = "arm"))]
-        watch.look(&drive::state(), tell);
+        if on_arm {
+            watch.look_for_arm(&drive::state(), tell);
+        } else {
+            watch.look(&drive::state(), tell);
+        }
     }
 }

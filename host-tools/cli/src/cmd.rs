@@ -1,18 +1,17 @@
 //! The command `tactus`: a file for each of its commands, with the arguments, what is done and what is said.
 
 mod args;
-mod config;
+mod completions;
 mod convert;
 mod device;
+mod environment;
 mod evaluate;
 mod features;
-mod gauge;
-mod growth;
 mod identify;
 mod import;
 mod known;
 mod learn;
-mod manual;
+
 mod names;
 mod output;
 mod plot;
@@ -61,19 +60,15 @@ enum Command {
     Identify(identify::Args),
     Evaluate(evaluate::Args),
     Verify(verify::Args),
-    Gauge(gauge::Args),
     Simulate(simulate::Args),
     LearnByHand(learn::ByHand),
     Study(study::Args),
-    Growth(growth::Args),
     #[command(subcommand)]
     Device(device::Command),
     Textures(known::Args),
-    Completions(manual::Completions),
-    Man(manual::Man),
+    Completions(completions::Args),
     Import(import::Args),
     Convert(convert::Args),
-    Config(config::Args),
     Unpack(unpack::Args),
 }
 
@@ -86,7 +81,6 @@ const CONVENTIONS: &str = "\
 Environment:
   TACTUS_RECORDINGS   the folder, where --recordings is not given
   TACTUS_PORT         the probe's port, where --port is not given
-  TACTUS_CONFIG       the file of settings, in place of tactus.toml: `tactus config --help`
 
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
@@ -94,15 +88,13 @@ Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those k
 pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
-    let arguments = config::read(&Tactus::command(), std::env::args_os())?;
     let Tactus {
         quiet,
         verbose,
         command,
-    } = Tactus::parse_from(arguments);
+    } = Tactus::parse();
     verbose::be_verbose(verbose);
-    config::tell();
-    if quiet || config::is_quiet() {
+    if quiet {
         progress::be_quiet();
     }
     match command {
@@ -114,18 +106,14 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
         Some(Command::Verify(args)) => done = verify::run(&args, out)?,
-        Some(Command::Gauge(args)) => gauge::run(&args, out)?,
         Some(Command::Simulate(args)) => simulate::run(&args, out)?,
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
-        Some(Command::Growth(args)) => growth::run(&args, out)?,
         Some(Command::Device(command)) => done = device::run(&command, out)?,
         Some(Command::Textures(args)) => known::run(&args, out)?,
-        Some(Command::Completions(args)) => manual::completions(&args, Tactus::command(), out)?,
-        Some(Command::Man(args)) => manual::pages(&args, Tactus::command(), out)?,
+        Some(Command::Completions(args)) => completions::run(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,
-        Some(Command::Config(args)) => config::run(&args, out)?,
         Some(Command::Unpack(args)) => unpack::run(&args, out)?,
     }
     out.flush()?;

@@ -7,7 +7,6 @@ mod error;
 pub mod faults;
 mod handheld;
 mod identify;
-pub mod scope;
 mod serve;
 mod soak;
 mod stack_depth;
@@ -52,10 +51,6 @@ enum Cli {
     Soak(soak::Args),
     /// Count the instructions of the core's kernels
     Bench(bench::Args),
-    /// Draw what an oscilloscope shows at the pins
-    #[command(after_help = "Example:
-  tactus-emulator scope --elf tactus-rig --out docs/src           the pictures of the book")]
-    Scope(scope::Args),
     /// Measure how deep its stack gets
     Stack(stack_depth::Args),
 }
@@ -77,7 +72,6 @@ fn run(cli: &Cli) -> Result<ExitCode, RunError> {
         Cli::Faults(args) => faults::run(args).map(met),
         Cli::Soak(args) => soak::run(args).map(met),
         Cli::Bench(args) => bench::run(args),
-        Cli::Scope(args) => scope::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Stack(args) => stack_depth::run(args).map(|()| ExitCode::SUCCESS),
     }
 }

@@ -18,7 +18,6 @@ pub mod refresh;
 pub mod reliability;
 pub mod report;
 pub mod samples;
-pub mod seconds;
 pub mod show;
 pub mod table_summary;
 pub mod transcript;

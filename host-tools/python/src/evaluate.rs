@@ -112,7 +112,6 @@ impl Asks {
                 runs,
                 seed,
                 config,
-                time: None,
                 with_courses: arguments.reliability,
             },
         })

@@ -4,7 +4,6 @@
 pub mod chart;
 mod error;
 pub mod fabricslide;
-pub mod growth;
 pub mod identify;
 pub mod page;
 pub mod pictures;

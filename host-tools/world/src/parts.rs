@@ -25,6 +25,8 @@ pub(super) enum Peers {
         cell: ads1220::Ads1220,
         selected: Option<bool>,
         unplugged: bool,
+        /// Only the accelerometer is.
+        without_accelerometer: bool,
     },
 }
 
@@ -39,6 +41,7 @@ impl Peers {
                 cell: ads1220::Ads1220::new(seed),
                 selected: None,
                 unplugged: false,
+                without_accelerometer: false,
             },
         }
     }
@@ -61,10 +64,13 @@ impl Peers {
             Self::BioTac(sensor) => sensor.plug(now_ns),
             Self::Analog(converter) => *converter = mcp3202::Mcp3202::default(),
             Self::Mems {
-                cell, unplugged, ..
+                cell,
+                unplugged,
+                without_accelerometer,
+                ..
             } => {
                 cell.mend_wire();
-                *unplugged = false;
+                (*unplugged, *without_accelerometer) = (false, false);
             }
         }
     }
@@ -121,8 +127,10 @@ impl Peers {
                 cell,
                 selected,
                 unplugged,
+                without_accelerometer,
             } => match *selected {
                 _ if *unplugged => FLOATING,
+                Some(true) if *without_accelerometer => FLOATING,
                 Some(true) => accelerometer.byte(now_ns, mosi),
                 Some(false) => cell.byte(now_ns, mosi),
                 None => FLOATING,
@@ -155,6 +163,13 @@ impl Peers {
         match (self, fault) {
             (Self::Analog(converter), PartFault::Unplugged) => converter.unplug(),
             (Self::Mems { unplugged, .. }, PartFault::Unplugged) => *unplugged = true,
+            (
+                Self::Mems {
+                    without_accelerometer,
+                    ..
+                },
+                PartFault::AccelerometerUnplugged,
+            ) => *without_accelerometer = true,
             (Self::Mems { accelerometer, .. }, PartFault::AccelerometerBrownOut) => {
                 accelerometer.brown_out(now_ns);
             }

@@ -2,12 +2,9 @@
 
 use std::convert::Infallible;
 
-use tactus_core::sensor::analog::Analog;
-use tactus_core::sensor::biotac::BioTac;
-use tactus_core::sensor::mems::Mems;
 use tactus_core::sensor::pressure::Pressure;
 use tactus_core::sensor::slot::{self, Port, StartStep, Transaction, Unexpected};
-use tactus_core::sensor::{FingerModel, FingerName, GRAVITY_PARTS, PressureSensor, slot_of};
+use tactus_core::sensor::{AnyFinger, FingerModel, FingerName, FingerParts, GRAVITY_PARTS};
 
 use super::parts::ClockMode;
 
@@ -29,88 +26,46 @@ pub struct Transfer {
     pub takes_ns: u64,
 }
 
-/// One of the fingers, as a probe reads it.
+/// A finger, as a probe reads it.
 #[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant)]
-pub enum Reader {
-    /// A BioTac.
-    BioTac(BioTac),
-    /// A piezo disc and a load cell.
-    Analog(Analog),
-    /// An accelerometer and a load cell.
-    Mems(Mems),
-}
-
-/// What one decoder or the other says.
-macro_rules! each {
-    ($self:expr, $S:ident, $expression:expr) => {
-        match $self {
-            Reader::BioTac(_) => {
-                type $S = BioTac;
-                $expression
-            }
-            Reader::Analog(_) => {
-                type $S = Analog;
-                $expression
-            }
-            Reader::Mems(_) => {
-                type $S = Mems;
-                $expression
-            }
-        }
-    };
+pub struct Reader {
+    finger: AnyFinger,
+    parts: &'static FingerParts,
 }
 
 impl Reader {
     /// The decoder of a finger, which has seen nothing yet.
     pub fn new(finger: FingerName) -> Self {
-        match finger {
-            FingerName::Biotac => Self::BioTac(BioTac),
-            FingerName::Analog => Self::Analog(Analog),
-            FingerName::Mems => Self::Mems(Mems::new()),
+        Self {
+            finger: AnyFinger::new(finger),
+            parts: finger.parts(),
         }
     }
 
-    /// What kind of finger it is.
+    /// The kind of finger.
     pub fn model(&self) -> &'static FingerModel {
-        each!(self, S, &S::MODEL)
+        &self.parts.model
     }
 
     /// Its parts.
     pub fn ports(&self) -> &'static [Port] {
-        each!(self, S, S::PORTS)
+        self.parts.ports
     }
 
-    /// From power to the first transfer, ms.
+    /// The time from power to the first transfer, ms.
     pub fn power_up_ms(&self) -> u32 {
-        each!(self, S, S::POWER_UP_MS)
+        self.parts.power_up_ms
     }
 
     /// Its start-up list.
     pub fn start(&self) -> &'static [StartStep] {
-        each!(self, S, S::START)
+        self.parts.start
     }
 
-    fn slot(&self, n: u32) -> &'static [Transaction] {
-        each!(self, S, slot_of::<S>(n))
-    }
-
-    fn decode(&mut self, n: u32, answer: &[u8]) -> Option<Pressure> {
-        match self {
-            Self::BioTac(finger) => finger.decode(n, answer).ok(),
-            Self::Analog(finger) => finger.decode(n, answer).ok(),
-            Self::Mems(finger) => finger.decode(n, answer).ok(),
-        }
-    }
-
-    /// Gravity along it, counts of P_AC: see [`PressureSensor::gravity`].
+    /// Gravity along it, counts of P_AC: see [`AnyFinger::gravity`].
     pub fn gravity(&self) -> Option<f32> {
-        let parts = match self {
-            Self::BioTac(finger) => finger.gravity(),
-            Self::Analog(finger) => finger.gravity(),
-            Self::Mems(finger) => finger.gravity(),
-        };
-        parts.map(|parts| parts as f32 / GRAVITY_PARTS)
+        let parts = self.finger.gravity()?;
+        Some(parts as f32 / GRAVITY_PARTS)
     }
 
     /// How a transaction is made that begins at this time, ns.
@@ -134,13 +89,13 @@ impl Reader {
         // slots begin again after two, or four
         let n = n as u32;
         let mut begins_ns = at_ns;
-        let Ok(answer) = slot::perform(self.slot(n), |transaction, miso| {
+        let Ok(answer) = slot::perform(self.parts.slot(n), |transaction, miso| {
             let transfer = self.transfer(transaction, begins_ns);
             transact(&transfer, transaction.out, miso);
             begins_ns += transfer.takes_ns + 1000 * u64::from(transaction.gap_us) + LATE_NS;
             Ok::<(), Infallible>(())
         });
-        self.decode(n, &answer)
+        self.finger.decode(n, &answer).ok()
     }
 
     /// Does the start-up list. `transact` gets each of its transfers and lets time pass until the given one, ns.

@@ -1,8 +1,6 @@
-//! A release: what is flashed and what runs on a PC, how to check and flash it, and what it is made of.
+//! `cargo xtask bundle`: a release, with what is flashed, what runs on a PC, and how to check and flash it.
 mod image;
 mod licences;
-mod products;
-mod reproduce;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,21 +9,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
-use crate::factory::{FOLDER, TABLES};
-use crate::firmware::{self, hash, released, shown};
-use crate::sbom::FIRMWARE;
-use crate::shell::{self, root};
-use products::{COMMAND, PAGE, Product, WHEEL};
-pub(crate) use reproduce::reproduce;
+use crate::campaign::{FOLDER, TABLES};
+use crate::firmware::{self, IMAGES, hash, shown};
+use crate::shell::{self, root, run, target};
+use crate::toolchain::{self, BROWSER};
+use crate::{page, python};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask bundle                         everything, into target/bundle
-  cargo xtask bundle --only tactus-rig,command   one image and the command for this PC
-  cargo xtask campaign --builds              everything twice, in different folders: are the bytes the same?";
+  cargo xtask bundle                             everything, into target/bundle
+  cargo xtask bundle --only tactus-rig,command   one image and the command for this PC";
 
 const SUMS: &str = "SHA256SUMS";
-/// What every dependency allows, in its own words.
 const LICENCES: &str = "LICENSES-DEPENDENCIES.txt";
 
 #[derive(Args)]
@@ -41,10 +36,75 @@ pub(crate) struct Options {
 /// Names and contents.
 type Files = BTreeMap<String, Vec<u8>>;
 
+/// A file of a release that runs on a PC.
+struct Product {
+    /// Its name for `--only`.
+    name: &'static str,
+    /// Its manifest, its package, and the platform if it is not this machine's: whose licences count.
+    made_of: (&'static str, &'static str, Option<&'static str>),
+    /// An error where this machine lacks what builds it.
+    lacks: fn() -> Result<()>,
+    /// Builds it: the name of its file, and where it is.
+    build: fn() -> Result<(String, PathBuf)>,
+}
+
+const PRODUCTS: [Product; 3] = [
+    Product {
+        name: "command",
+        made_of: ("Cargo.toml", "tactus-probe", None),
+        lacks: || Ok(()),
+        build: command,
+    },
+    Product {
+        name: "wheel",
+        made_of: ("host-tools/python/Cargo.toml", "tactus-python", None),
+        lacks: python::can_build,
+        build: || {
+            let wheel = python::wheel()?;
+            let name = wheel.file_name().unwrap_or_default();
+            Ok((name.to_string_lossy().into_owned(), wheel))
+        },
+    },
+    Product {
+        name: "page",
+        made_of: (
+            "host-tools/page/Cargo.toml",
+            "tactus-page",
+            Some(BROWSER.triple),
+        ),
+        lacks: || toolchain::get(BROWSER).map(drop),
+        build: || Ok(("tactus-page.html".to_owned(), page::build()?.page)),
+    },
+];
+/// The images, as [`Product::made_of`].
+const FIRMWARE: (&str, &str, Option<&str>) = (
+    "Cargo.toml",
+    "tactus-firmware",
+    Some(toolchain::CHIP.triple),
+);
+
+/// The program `tactus` for this PC.
+fn command() -> Result<(String, PathBuf)> {
+    let folder = target().join("command");
+    let mut build = toolchain::host_build(&folder);
+    build.args([
+        "--release",
+        "--locked",
+        "--package",
+        "tactus-probe",
+        "--bin",
+        "tactus",
+    ]);
+    // a panic says its place without them
+    run(build.env("CARGO_PROFILE_RELEASE_STRIP", "symbols"))?;
+    let end = std::env::consts::EXE_SUFFIX;
+    let built = folder.join("release").join(format!("tactus{end}"));
+    Ok((format!("tactus-{}{end}", toolchain::host()?), built))
+}
+
 /// All that `--only` knows.
 fn names() -> Vec<&'static str> {
-    let products = [COMMAND, WHEEL, PAGE].map(|product| product.name);
-    [&released()[..], &products].concat()
+    [&IMAGES[..], &PRODUCTS.map(|product| product.name)].concat()
 }
 
 /// Builds what was asked for and writes the release.
@@ -61,70 +121,49 @@ pub(crate) fn bundle(options: &Options) -> Result<()> {
 /// Everything that is in a release, or what of it is named.
 fn files(only: &[String]) -> Result<Files> {
     let wanted = |name: &str| only.is_empty() || only.iter().any(|one| one == name);
-    let images: Vec<&str> = released().into_iter().filter(|name| wanted(name)).collect();
-    let mut files = Files::new();
-    let mut parts = Vec::new();
+    let images: Vec<&str> = IMAGES.into_iter().filter(|name| wanted(name)).collect();
+    let (mut files, mut parts) = (Files::new(), Vec::new());
     if !images.is_empty() {
         for elf in firmware::compile(&images)? {
-            let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
-            add_image(&mut files, firmware::name(&elf)?, bytes)?;
+            let (name, bytes) = (firmware::name(&elf)?, read(&elf)?);
+            let (flat, hex) = image::formats(&bytes).with_context(|| name.to_owned())?;
+            files.insert(format!("{name}.hex"), hex.into());
+            files.insert(format!("{name}.bin"), flat);
+            files.insert(format!("{name}.elf"), bytes);
         }
         for name in TABLES.into_iter().flat_map(|(_, names)| names) {
-            let table = root().join(FOLDER).join(name);
-            let bytes = std::fs::read(&table).with_context(|| table.display().to_string())?;
-            files.insert((*name).to_owned(), bytes);
+            files.insert((*name).to_owned(), read(&root().join(FOLDER).join(name))?);
         }
         parts.push(FIRMWARE);
     }
-    for product in [COMMAND, WHEEL, PAGE] {
-        if wanted(product.name) && add_product(&mut files, &product)? {
-            parts.push(product.part);
+    for product in PRODUCTS.into_iter().filter(|product| wanted(product.name)) {
+        let name = product.name;
+        if let Err(why) = (product.lacks)() {
+            if std::env::var("CI").as_deref() == Ok("true") {
+                bail!("a release without the {name}: {why:#}");
+            }
+            shell::skip(&format!("the {name}"), &format!("{why:#}"))?;
+            continue;
         }
+        let (file, built) =
+            (product.build)().with_context(|| format!("the {name} is not built"))?;
+        files.insert(file, read(&built)?);
+        parts.push(product.made_of);
     }
-    let mut packages = BTreeMap::new();
-    for part in parts {
-        let metadata = part.metadata()?;
-        files.insert(part.file(), part.bill(&metadata)?);
-        packages.extend(part.packages(&metadata)?);
+    files.insert(LICENCES.into(), licences::of(&parts)?.into());
+    for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        files.insert(ours.to_owned(), read(&root().join(ours))?);
     }
-    files.insert(LICENCES.into(), licences::of(packages.values())?.into());
-    let ours = [
-        (
-            "LICENSE-MIT",
-            include_bytes!("../../../LICENSE-MIT").as_slice(),
-        ),
-        ("LICENSE-APACHE", include_bytes!("../../../LICENSE-APACHE")),
-    ];
-    files.extend(ours.map(|(name, text)| (name.to_owned(), text.to_owned())));
     files.insert("FLASHING.md".into(), flashing().into());
     files.insert(SUMS.into(), sums(&files).into());
     Ok(files)
 }
 
-fn add_image(files: &mut Files, name: &str, elf: Vec<u8>) -> Result<()> {
-    let (flat, hex) = image::formats(&elf).with_context(|| name.to_owned())?;
-    files.insert(format!("{name}.hex"), hex.into());
-    files.insert(format!("{name}.bin"), flat);
-    files.insert(format!("{name}.elf"), elf);
-    Ok(())
+fn read(file: &Path) -> Result<Vec<u8>> {
+    std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))
 }
 
-/// Builds what runs on a PC. Whether there was what it takes: in CI it is an error if not.
-fn add_product(files: &mut Files, product: &Product) -> Result<bool> {
-    if let Err(why) = (product.lacks)() {
-        if std::env::var("CI").as_deref() == Ok("true") {
-            bail!("a release without {}: {why:#}", product.what);
-        }
-        shell::skip(product.what, &format!("{why:#}"))?;
-        return Ok(false);
-    }
-    let (name, bytes) =
-        (product.build)().with_context(|| format!("{} is not built", product.what))?;
-    files.insert(name, bytes);
-    Ok(true)
-}
-
-/// In the format of sha256sum.
+/// Hash sums in the format of sha256sum.
 fn sums(files: &Files) -> String {
     files.iter().fold(String::new(), |mut sums, (name, bytes)| {
         let _ = writeln!(sums, "{}  {name}", hash(bytes));
@@ -147,7 +186,7 @@ fn write(out: &Path, files: &Files) -> Result<()> {
         let file = out.join(name);
         std::fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))?;
         #[cfg(unix)]
-        if *name == products::program()? {
+        if bytes.starts_with(b"\x7fELF") && !name.ends_with(".elf") {
             use std::os::unix::fs::PermissionsExt as _;
             std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755))?;
         }
@@ -170,22 +209,14 @@ mod tests {
     #[test]
     fn a_release_can_be_written_twice_and_leaves_other_files_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let release = || {
-            let mut files = Files::from([("factory.tact".to_owned(), b"table".to_vec())]);
-            files.insert(SUMS.into(), sums(&files).into());
-            files
-        };
-        write(folder.path(), &release()).unwrap();
-        let first = std::fs::read(folder.path().join(SUMS)).unwrap();
-        write(folder.path(), &release()).unwrap();
-        assert_eq!(std::fs::read(folder.path().join(SUMS)).unwrap(), first);
-        let table = hash(b"table");
-        assert_eq!(
-            String::from_utf8(first).unwrap(),
-            format!("{table}  factory.tact\n")
-        );
+        let mut files = Files::from([("factory.tact".to_owned(), b"table".to_vec())]);
+        files.insert(SUMS.into(), sums(&files).into());
+        write(folder.path(), &files).unwrap();
+        write(folder.path(), &files).unwrap();
+        let sums = std::fs::read_to_string(folder.path().join(SUMS)).unwrap();
+        assert_eq!(sums, format!("{}  factory.tact\n", hash(b"table")));
         std::fs::write(folder.path().join("thesis.txt"), "mine").unwrap();
-        let error = write(folder.path(), &release()).unwrap_err().to_string();
+        let error = write(folder.path(), &files).unwrap_err().to_string();
         assert!(error.contains("thesis.txt"), "{error}");
     }
 
@@ -195,7 +226,7 @@ mod tests {
         let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
         let files = rows.filter_map(|row| row.split(" |").next());
         let named: Vec<&str> = files.flat_map(|files| files.split(", ")).collect();
-        for image in released() {
+        for image in IMAGES {
             let elf = format!("{image}.elf");
             assert!(
                 named.iter().any(|name| *name == image || *name == elf),

@@ -43,20 +43,19 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
         Options { test: true, .. } => "tactus-silicon",
         _ => "tactus-rig",
     };
-    let elves = firmware::elves()?;
-    let elf = firmware::image(&elves, wanted)?;
-    run(&mut command(options, elf))?;
+    let elf = firmware::compile(&[wanted])?.remove(0);
+    run(&mut command(options, &elf))?;
     if !options.is_watched() && !options.dry_run {
         println!(
             "The firmware runs. Its log: probe-rs attach --chip {CHIP} {}",
-            firmware::shown(elf)
+            firmware::shown(&elf)
         );
     }
     Ok(())
 }
 
 impl Options {
-    /// Whether the image has a report.
+    /// Returns true for an image that reports.
     fn is_watched(&self) -> bool {
         self.self_test || self.test
     }

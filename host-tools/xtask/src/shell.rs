@@ -1,11 +1,11 @@
 //! Where things are, and how other programs are run.
-use std::io::{IsTerminal as _, Write as _};
+use std::io::{BufRead as _, BufReader, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 
 /// Names the file to which tests that are skipped add a line each.
 pub(crate) const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
@@ -36,7 +36,7 @@ pub(crate) fn tactus() -> Command {
     tactus
 }
 
-/// Whether cargo has this command.
+/// Returns true if cargo has this command.
 pub(crate) fn has_subcommand(name: &str) -> bool {
     cargo()
         .args([name, "--version"])
@@ -49,7 +49,8 @@ pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Does something with each of many, so many at a time, and says on a terminal how far it is: the results, in no order.
+/// Does the work with each of many, so many at a time, and shows progress on a terminal. Returns the results in no
+/// order.
 pub(crate) fn each_of<T: Sync, R: Send>(
     all: &[T],
     at_a_time: usize,
@@ -94,7 +95,30 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Says that something is not tested and why, where the account of the steps lists it.
+/// Runs a command, passes on what it prints, and hands each line to `on_line`; an error, with the last line, unless it
+/// succeeds.
+pub(crate) fn hear(command: &mut Command, mut on_line: impl FnMut(&str)) -> Result<()> {
+    let program = command.get_program().display().to_string();
+    let child = command.stdout(Stdio::piped()).spawn();
+    let mut child = child.with_context(|| format!("cannot start {program}"))?;
+    let output = child.stdout.take().context("a program without output")?;
+    let mut last = String::new();
+    // not by lines(): a test may print bytes that are not UTF-8
+    for line in BufReader::new(output).split(b'\n') {
+        let line = line?;
+        let line = String::from_utf8_lossy(&line);
+        println!("{line}");
+        on_line(&line);
+        if !line.trim().is_empty() {
+            line.trim().clone_into(&mut last);
+        }
+    }
+    let status = child.wait()?;
+    ensure!(status.success(), "{program} ended with {status}: {last}");
+    Ok(())
+}
+
+/// Reports that something is not tested and why, where the summary of the steps lists it.
 pub(crate) fn skip(what: &str, why: &str) -> Result<()> {
     eprintln!("SKIPPED {what}: {why}");
     if let Some(log) = std::env::var_os(SKIP_LOG) {
@@ -116,5 +140,12 @@ mod tests {
         assert!(run(&mut Command::new("true")).is_ok());
         let error = run(&mut Command::new("false")).unwrap_err().to_string();
         assert!(error.starts_with("false ended with"), "{error}");
+        let mut heard = String::new();
+        let mut fails = Command::new("sh");
+        let error = hear(fails.args(["-c", "echo how; echo why; false"]), |line| {
+            heard += line
+        });
+        assert!(error.unwrap_err().to_string().ends_with(": why"));
+        assert_eq!(heard, "howwhy");
     }
 }

@@ -1,8 +1,10 @@
-//! What belongs to no single command: the command line, who asks for it, and what is published.
-mod packages;
-
+//! Tests of the command line, of those who ask for its commands, and of versions.
 use super::*;
 use clap::CommandFactory as _;
+
+fn text(file: &str) -> String {
+    std::fs::read_to_string(shell::root().join(file)).unwrap()
+}
 
 #[test]
 fn the_command_line_is_consistent() {
@@ -10,57 +12,77 @@ fn the_command_line_is_consistent() {
 }
 
 #[test]
-fn workflows_and_instructions_ask_for_commands_that_there_are() {
+fn workflows_and_pages_ask_for_commands_that_there_are() {
+    let book = std::fs::read_dir(shell::root().join("docs/src")).unwrap();
+    let book = book.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let book = book.filter(|name| name.ends_with(".md"));
+    let mut files: Vec<String> = book.map(|name| format!("docs/src/{name}")).collect();
+    files.extend(["ci", "page", "release"].map(|name| format!(".github/workflows/{name}.yml")));
+    files.extend([".ci/run", "README.md", "CONTRIBUTING.md"].map(str::to_owned));
     let mut asked = 0;
-    let files = [
-        ".github/workflows/ci.yml",
-        ".github/workflows/page.yml",
-        ".github/workflows/release.yml",
-        ".ci/run",
-        "docs/src/release.md",
-    ];
     for file in files {
-        let text = std::fs::read_to_string(shell::root().join(file)).unwrap();
-        for line in text.lines() {
-            let Some((_, command)) = line.split_once("cargo xtask ") else {
+        for asks in text(&file)
+            .replace("-->", "\n")
+            .split("cargo xtask ")
+            .skip(1)
+        {
+            // a command of an earlier commit, which the page names
+            let soon: String = asks.chars().take(60).collect();
+            if soon.contains("commit ") {
                 continue;
-            };
-            let end = command
-                .find(['#', '`', '&', '|', ';'])
-                .unwrap_or(command.len());
-            let words = command[..end].split_whitespace();
+            }
+            let end = asks.find(['#', '`', '&', '|', ';', '\n', '(', ')']);
+            let words = asks[..end.unwrap_or(asks.len())].split_whitespace();
+            let words = words.map(|word| word.trim_matches([',', '.', ':']));
             let parsed = Cli::try_parse_from(["xtask"].into_iter().chain(words));
-            assert!(parsed.is_ok(), "{file}: {line}: {}", parsed.err().unwrap());
+            // "--help" ends it, too
+            let is_wrong = parsed.as_ref().is_err_and(clap::Error::use_stderr);
+            assert!(!is_wrong, "{file}: {soon}: {}", parsed.err().unwrap());
             asked += 1;
         }
     }
-    assert!(asked >= 5, "{asked}");
+    assert!(asked >= 20, "{asked}");
 }
 
 #[test]
 fn a_workflow_is_steps_of_one_job() {
     // no YAML here: what a misplaced indentation or a tab would break
     for name in ["ci", "page", "release"] {
-        let file = shell::root().join(format!(".github/workflows/{name}.yml"));
-        let text = std::fs::read_to_string(&file).unwrap();
+        let text = text(&format!(".github/workflows/{name}.yml"));
         assert!(!text.contains('\t'), "{name}: a tab");
-        let steps = text.split_once("\n    steps:\n").expect("steps").1;
-        for line in steps.lines() {
-            let indent = line.len() - line.trim_start().len();
-            let item = line.trim_start().starts_with("- ");
-            let comment = line.trim_start().starts_with('#');
-            assert!(
-                comment || (item && indent == 6) || (!item && [8, 10].contains(&indent)),
-                "{name}: {line}"
-            );
+        for line in text.split_once("\n    steps:\n").expect("steps").1.lines() {
+            let start = line.trim_start();
+            let indent = line.len() - start.len();
+            let is_right = match start.starts_with("- ") {
+                true => indent == 6,
+                false => start.starts_with('#') || [8, 10].contains(&indent),
+            };
+            assert!(is_right, "{name}: {line}");
         }
     }
 }
 
 #[test]
-fn options_behind_mutants_go_through() {
-    let Cli::Mutants { options } = Cli::parse_from(["xtask", "mutants", "--jobs", "2"]) else {
-        panic!("not mutants");
-    };
-    assert_eq!(options, ["--jobs", "2"]);
+fn the_version_is_the_same_everywhere() {
+    let version = env!("CARGO_PKG_VERSION");
+    let has = |file: &str, line: &str| assert!(text(file).contains(line), "{file}: {line}");
+    for folder in test::OTHERS {
+        has(
+            &format!("{folder}/Cargo.toml"),
+            &format!("\nversion = \"{version}\"\n"),
+        );
+    }
+    has(
+        "host-tools/python/pyproject.toml",
+        &format!("\nversion = \"{version}\"\n"),
+    );
+    has("CITATION.cff", &format!("\nversion: {version}\n"));
+    has("CHANGELOG.md", &format!("\n## {version}"));
+    let manifest = text("Cargo.toml");
+    let own = manifest
+        .lines()
+        .filter(|line| line.starts_with("tactus") && line.contains("version"));
+    for line in own {
+        assert!(line.contains(&format!("version = \"{version}\"")), "{line}");
+    }
 }

@@ -41,9 +41,14 @@ pub(crate) enum Toolchain {
     Debian,
 }
 
+/// The environment variable that asks for one of the toolchains, by its [`Toolchain::name`].
+pub(crate) const WANTED: &str = "TACTUS_TOOLCHAIN";
+
 /// What was found.
 #[derive(Clone, Copy)]
 struct Found {
+    /// Only this one counts.
+    wanted: Option<Toolchain>,
     active_has_target: bool,
     debian: bool,
     /// apt-get is here and we are root.
@@ -58,8 +63,11 @@ enum Choice {
 }
 
 fn choose(found: Found) -> Choice {
-    if found.active_has_target {
+    let active = found.active_has_target && found.wanted != Some(Toolchain::Debian);
+    if active {
         Choice::Use(Toolchain::Active)
+    } else if found.wanted == Some(Toolchain::Active) {
+        Choice::Neither
     } else if found.debian {
         Choice::Use(Toolchain::Debian)
     } else if found.may_install {
@@ -73,6 +81,7 @@ fn choose(found: Found) -> Choice {
 pub(crate) fn get(target: Target) -> Result<Toolchain> {
     let help = help(target);
     let found = Found {
+        wanted: wanted()?,
         active_has_target: active_has(target),
         debian: debian_lacks().is_none(),
         may_install: Path::new("/usr/bin/apt-get").exists()
@@ -94,6 +103,18 @@ pub(crate) fn get(target: Target) -> Result<Toolchain> {
     }
 }
 
+/// The toolchain that [`WANTED`] asks for, if it is set.
+fn wanted() -> Result<Option<Toolchain>> {
+    let Some(name) = std::env::var_os(WANTED).filter(|name| !name.is_empty()) else {
+        return Ok(None);
+    };
+    let mut both = [Toolchain::Active, Toolchain::Debian].into_iter();
+    match both.find(|toolchain| name == toolchain.name()) {
+        None => bail!("{WANTED}={}: there are active and debian", name.display()),
+        found => Ok(found),
+    }
+}
+
 fn help(target: Target) -> String {
     format!(
         "\
@@ -108,18 +129,25 @@ and run the command again.",
 }
 
 impl Toolchain {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Active => "active",
+            Self::Debian => "debian",
+        }
+    }
+
     /// A `cargo build` for a target, without profile and package.
     ///
-    /// What is built is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders are left out
-    /// of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies.
-    pub(crate) fn cargo_build(self, to: Target, flags: &[&str]) -> Command {
+    /// What is built is not to depend on who builds it and where, so RUSTFLAGS from outside do not count and folders
+    /// are left out of it. Warnings are denied in the workspace only: cargo caps the lints of dependencies.
+    pub(crate) fn cargo_build(self, to: Target) -> Command {
         let mut cargo = match self {
             Self::Active => cargo(),
             Self::Debian => debian_cargo(),
         };
         cargo
-            .env("CARGO_ENCODED_RUSTFLAGS", rustflags(flags))
-            .args(["build", "--target", to.triple, "--target-dir"])
+            .env("CARGO_ENCODED_RUSTFLAGS", rustflags())
+            .args(["build", "--locked", "--target", to.triple, "--target-dir"])
             .arg(self.folder(to));
         if self == Self::Debian {
             cargo.arg(format!("-Zbuild-std={}", to.library));
@@ -158,19 +186,15 @@ pub(crate) fn host() -> Result<String> {
 pub(crate) fn host_build(folder: &Path) -> Command {
     let mut cargo = cargo();
     cargo
-        .env("CARGO_ENCODED_RUSTFLAGS", rustflags(&[]))
+        .env("CARGO_ENCODED_RUSTFLAGS", rustflags())
         .args(["build", "--target-dir"])
         .arg(folder);
     cargo
 }
 
 /// What every such build gets, then these.
-pub(crate) fn rustflags(more: &[&str]) -> OsString {
+pub(crate) fn rustflags() -> OsString {
     let mut flags = OsString::from("-Dwarnings");
-    for flag in more {
-        flags.push("\x1f");
-        flags.push(flag);
-    }
     let mut leave_out = |folder: &Path, name: &str| {
         // cargo's separator: folders may have spaces
         flags.push("\x1f--remap-path-prefix=");
@@ -301,6 +325,7 @@ mod tests {
     #[test]
     fn the_active_toolchain_goes_first_and_nothing_is_installed_in_vain() {
         let nothing = Found {
+            wanted: None,
             active_has_target: false,
             debian: false,
             may_install: false,
@@ -321,6 +346,16 @@ mod tests {
             ..debian
         };
         assert_eq!(choose(both), Choice::Use(Toolchain::Active));
+        let wants = |wanted, found| {
+            choose(Found {
+                wanted: Some(wanted),
+                ..found
+            })
+        };
+        let debians = Choice::Use(Toolchain::Debian);
+        assert_eq!(wants(Toolchain::Debian, both), debians);
+        assert_eq!(wants(Toolchain::Debian, root), Choice::InstallDebian);
+        assert_eq!(wants(Toolchain::Active, debian), Choice::Neither);
     }
 
     #[test]

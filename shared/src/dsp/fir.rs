@@ -18,7 +18,7 @@ struct Words([i16; HISTORY + BLOCK]);
 pub struct BandPower {
     /// The last `HISTORY` samples before the block, then the block.
     samples: Words,
-    /// How many samples of the block are there.
+    /// The number of samples in the block so far.
     filled: usize,
     energy: u64,
     outputs: u32,

@@ -9,6 +9,7 @@ pub const LN_2: u32 = 2_977_044_472;
 pub const LOG2_E: u32 = 1_549_082_005;
 
 /// ln(1 + n/32) in Q32, and how much more the next one is, a multiple of 256.
+#[allow(clippy::indexing_slicing)] // while compiling
 pub const LN: [[u32; 2]; PARTS] = {
     let mut table = [[0; 2]; PARTS];
     let mut n = 0;
@@ -33,6 +34,7 @@ const fn ln_of_part(n: usize) -> u32 {
 }
 
 /// 2^(-n/32) in Q30, and how much less the next one is.
+#[allow(clippy::indexing_slicing)] // while compiling
 pub const EXP2: [[u32; 2]; PARTS] = {
     let mut table = [[0; 2]; PARTS];
     let mut n = 0;
@@ -55,8 +57,8 @@ const fn exp2_of_part(n: usize) -> u32 {
     (sum * 1_073_741_824.0 + 0.5) as u32
 }
 
-/// Natural logarithm of `x / 65536`, in Q16; 0 is taken as the smallest number. At most 1.5e-4 below the true value, never
-/// more than a step of Q16 above it.
+/// Natural logarithm of `x / 65536`, in Q16; 0 is taken as the smallest number. At most 1.5e-4 below the true value,
+/// never more than a step of Q16 above it.
 pub const fn ln_q16(x: u64) -> i32 {
     let x = if x == 0 { 1 } else { x };
     // a shift of 64 bits takes the chip several
@@ -69,6 +71,7 @@ pub const fn ln_q16(x: u64) -> i32 {
 }
 
 /// From a number of 1 to 2 in Q31 times so many octaves.
+#[allow(clippy::indexing_slicing)] // masked
 const fn ln(mantissa: u32, octaves: i64) -> i32 {
     // the first bit is the one
     let [low, more] = LN[(mantissa >> 26) as usize & (PARTS - 1)];
@@ -96,9 +99,10 @@ pub const fn exp2_neg_q30(x: u32) -> u32 {
     power(x >> 18, (x >> 13) as usize, x << 19)
 }
 
-/// 2 to the power of less these whole octaves and this part, of which the last five bits count; `between` that and the next
-/// one, Q32.
+/// 2 to the power of less these whole octaves and this part, of which the last five bits count; `between` that and the
+/// next one, Q32.
 #[inline(always)]
+#[allow(clippy::indexing_slicing)] // masked
 const fn power(whole: u32, part: usize, between: u32) -> u32 {
     let [high, less] = EXP2[part & (PARTS - 1)];
     (high - ((less as u64 * between as u64) >> 32) as u32) >> (whole & 31)

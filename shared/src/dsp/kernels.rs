@@ -10,21 +10,21 @@ use microfft::real::rfft_64;
 
 use super::plan::{Angles, FRAME, Folded, TAPS, Taps};
 
-/// What costs the time of a slide.
+/// The functions that take most of a slide's time.
 pub trait Kernels {
     /// Copies samples; beyond what 12 bits can differ by, -4096..=4095, they are clipped. There are as many of both.
     fn clip(samples: &[i16], clipped: &mut [i16]);
 
-    /// Filters `samples` and returns the sum of the squared outputs, in Q14 counts^2: each output is the sum of products
-    /// (Q15) rounded to Q7.
+    /// Filters `samples` and returns the sum of the squared outputs, in Q14 counts^2: each output is the sum of
+    /// products (Q15) rounded to Q7.
     ///
     /// The first output is due at sample `TAPS - 1` (those before it are history), so there are
     /// `samples.len() - (TAPS - 1)` outputs, and none of fewer samples. No sample is outside -4096..=4095, which keeps
     /// the sum of products inside i32.
     fn band_energy(taps: &Taps, samples: &[i16]) -> u64;
 
-    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample
-    /// is outside -16384..=16383, so that sums of two are 16 bits.
+    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No
+    /// sample is outside -16384..=16383, so that sums of two are 16 bits.
     fn fold_frame<'r>(
         angles: &Angles,
         frame: &[i16; FRAME],
@@ -32,27 +32,28 @@ pub trait Kernels {
     ) -> &'r mut Folded;
 
     /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of
-    /// `folded`, transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins
-    /// are 0, 2, 4 and so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
+    /// `folded`, transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose
+    /// bins are 0, 2, 4 and so on (decimation in frequency). Both are as long as each other, a power of 2 from 8
+    /// to 128.
     fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]);
 
     /// Adds |X|^2 of each bin to its sum.
     fn add_power(bins: &[Complex32], sums: &mut [f32]);
 
-    /// Transforms 32, 64 or 128 values in place, as microfft does (decimation in time, radix 2); others stay as they are. The sign of
-    /// a 0 is open.
+    /// Transforms 32, 64 or 128 values in place, as microfft does (decimation in time, radix 2); others stay as they
+    /// are. The sign of a 0 is open.
     fn transform(_: &Angles, values: &mut [Complex32]) {
         transform(values);
     }
 
-    /// The lower half of the transform of reals, as microfft does it: that of the last bin, which is real, is the imaginary part of
-    /// the first one.
+    /// The lower half of the transform of reals, as microfft does it: that of the last bin, which is real, is the
+    /// imaginary part of the first one.
     fn transform_reals<'r>(_: &Angles, reals: &'r mut Reals) -> &'r mut [Complex32; FRAME / 16] {
         transform_reals(reals)
     }
 }
 
-/// What is left of a frame that was folded three times.
+/// A frame that was folded three times.
 pub type Reals = [f32; FRAME / 8];
 
 // both not generic: microfft is compiled once, with this crate

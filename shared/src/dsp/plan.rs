@@ -1,4 +1,4 @@
-//! What every slide needs and no slide changes: the coefficients of the band-pass, and the angles of window and transform.
+//! The constants of every slide: the coefficients of the band-pass, and the angles of window and transform.
 
 use core::f64::consts::{PI, TAU};
 
@@ -16,7 +16,7 @@ pub(crate) const HISTORY: usize = TAPS - 1;
 /// Samples in a frame.
 pub const FRAME: usize = 512;
 
-/// What every slide needs and no slide changes: the filter's coefficients, and the angles of window and transform.
+/// The constants of every slide: the filter's coefficients, and the angles of window and transform.
 #[derive(Clone, Debug)]
 pub struct Plan {
     taps: Taps,
@@ -37,7 +37,7 @@ impl Plan {
         &self.taps
     }
 
-    /// What the spectrum takes.
+    /// Returns the angles for the spectrum.
     pub fn angles(&self) -> &Angles {
         &self.angles
     }
@@ -78,12 +78,12 @@ const HALF_PAIRS: usize = TAPS.div_ceil(4) + 1;
 /// See [`HALVES`].
 pub type HalfFilters = [[[u32; 2]; HALF_PAIRS]; 3];
 
-/// Two outputs by three filters of half the length (fast FIR algorithm): with the even coefficients E and the odd ones O of the
-/// band-pass, and the even samples e and the odd ones o, an even output is `E e[m] + O o[m]`, and the odd one after it
-/// `(E + O) (o[m] + e[m+1]) - E e[m+1] - O o[m]`. These are E + O, O and E, oldest sample first (the filter is symmetric), for
-/// kernels that multiply pairs of samples: two coefficients to a word, the older sample's in the low half. Of each two words
-/// the first is for an output whose oldest sample is the first of a pair, the other for the output after it, which begins with
-/// the second of that pair.
+/// Two outputs by three filters of half the length (fast FIR algorithm): with the even coefficients E and the odd ones
+/// O of the band-pass, and the even samples e and the odd ones o, an even output is `E e[m] + O o[m]`, and the odd one
+/// after it `(E + O) (o[m] + e[m+1]) - E e[m+1] - O o[m]`. These are E + O, O and E, oldest sample first (the filter is
+/// symmetric), for kernels that multiply pairs of samples: two coefficients to a word, the older sample's in the low
+/// half. Of each two words the first is for an output whose oldest sample is the first of a pair, the other for the
+/// output after it, which begins with the second of that pair.
 pub const HALVES: HalfFilters = halves();
 
 #[expect(
@@ -217,8 +217,8 @@ pub fn angles() -> Angles {
     angles
 }
 
-/// Cosines of every 512th part of a turn from 0 to a quarter, computed by the compiler: what computes them takes more flash
-/// than they do.
+/// Cosines of every 512th part of a turn from 0 to a quarter, computed by the compiler: what computes them takes more
+/// flash than they do.
 const COSINES: [f32; FRAME / 4 + 1] = cosines();
 
 #[expect(
@@ -235,8 +235,8 @@ const fn cosines() -> [f32; FRAME / 4 + 1] {
     cosines
 }
 
-/// A frame that was folded: a complex number for every odd bin, then the reals that the even ones are the transform of, each
-/// with that half of them later.
+/// A frame that was folded: a complex number for every odd bin, then the reals that the even ones are the transform of,
+/// each with that half of them later.
 pub type Folded = [Complex32; FRAME / 2];
 
 #[cfg(test)]

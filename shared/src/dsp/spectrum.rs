@@ -1,13 +1,14 @@
-//! The averaged spectrum of the unfiltered P_AC (Hann windows of 512 samples, hop 256), its centroid (eq. 18) and its band
-//! powers.
+//! The averaged spectrum of the unfiltered P_AC (Hann windows of 512 samples, hop 256), its centroid (eq. 18) and its
+//! band powers.
 //!
-//! Only powers are wanted, so a frame need not be transformed as a whole and unpacked. The odd bins of n reals are a complex
-//! transform of n/4 values, each bin or its mirror image; the even ones are the transform of n/2 reals. [`Kernels::fold`]
-//! makes these of those, and after three times what is left is short. The transforms themselves are microfft's, or equal to them.
+//! Only powers are wanted, so a frame need not be transformed as a whole and unpacked. The odd bins of n reals are a
+//! complex transform of n/4 values, each bin or its mirror image; the even ones are the transform of n/2 reals.
+//! [`Kernels::fold`] makes these of those, and after three times what is left is short. The transforms themselves are
+//! microfft's, or equal to them.
 //!
 //! The mean of the slide is to be removed before the windows, but it is known only at the end. A Hann window has three
-//! non-zero bins, so the mean only reaches bins 0 and 1 of each frame, and [`SpectrumSum::finish`] takes it out again by
-//! linearity.
+//! non-zero bins, so the mean only reaches bins 0 and 1 of each frame, and [`SpectrumSum::finish`] takes it out again
+//! by linearity.
 
 use core::mem::MaybeUninit;
 use core::ops::Range;

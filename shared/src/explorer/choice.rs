@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use super::config::{Method, NEGLIGIBLE, Strategy};
 use super::kernels::{Kernels, LiveGaussian, LiveTexture, confused, exp_neg, left};
-#[cfg(any(test, feature = "timed"))]
 use super::objective::{Objective, SlideTime};
 use super::posterior::Explorer;
 use super::whitened;
@@ -25,8 +24,6 @@ pub struct ExpectedOutcome {
     /// Its benefit (eq. 12), lower the more often it was made.
     pub benefit: f32,
 }
-
-#[cfg(any(test, feature = "timed"))]
 impl ExpectedOutcome {
     /// Bits by which this action, made `made` times before, is expected to lower an `uncertainty` (eq. 11); never below 0. The
     /// more often it was made the less it is worth, by the exponent of eq. 12.
@@ -90,7 +87,6 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         &self,
         outcomes: impl Iterator<Item = &'o ExpectedOutcome>,
     ) -> Option<Action> {
-        #[cfg(any(test, feature = "timed"))]
         if let Objective::BitsPerSecond(time) = self.config.objective {
             return self.choose_by_rate(outcomes, time);
         }
@@ -103,16 +99,12 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         });
         best.map(|o| o.action)
     }
-
-    #[cfg(any(test, feature = "timed"))]
     /// Uncertainty (eq. 11) after a slide that tells nothing: every texture is confused with every other one.
     fn uncertainty_now(&self) -> f32 {
         // as eq. 10, which keeps the digits late in an exploration
         let left = |p: &f32| p * (1.0 - p).max(0.0);
         self.posterior.iter().map(left).sum()
     }
-
-    #[cfg(any(test, feature = "timed"))]
     /// Of these `outcomes`, the action that brings the most bits per second; of equals the one of greater benefit, then the
     /// first.
     fn choose_by_rate<'o>(
@@ -189,7 +181,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     /// Computed as eq. 10: 1 minus a sum that is close to 1 would lose the digits that decide late in an exploration.
     pub(super) fn uncertainty(&self, method: Method, action: Action) -> f32 {
         let movement = action.movement;
-        if K::ONLY_FUSED || method == Method::Fused {
+        if method == Method::Fused {
             return whitened::uncertainty::<K, N>(&self.table, movement, &self.posterior);
         }
         if let Some(property) = self.only_property(action) {

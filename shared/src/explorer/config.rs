@@ -2,12 +2,10 @@
 
 use core::fmt;
 
-use serde::{Deserialize, Serialize};
-
-#[cfg(any(test, feature = "timed"))]
 use super::objective::Objective;
 use crate::features::{FeatureSet, Property};
 use crate::table::{Action, Contents};
+use serde::{Deserialize, Serialize};
 
 /// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
 /// probability, all of 117 by about 2e-4. They are not reported either.
@@ -92,7 +90,6 @@ pub struct Config {
     /// [`Explorer::verification`]: super::Explorer::verification
     pub verify: bool,
     /// What Bayesian exploration chooses the next movement for.
-    #[cfg(any(test, feature = "timed"))]
     pub objective: Objective,
 }
 
@@ -107,7 +104,6 @@ impl Default for Config {
             open: false,
             false_alarm: None,
             verify: false,
-            #[cfg(any(test, feature = "timed"))]
             objective: Objective::Bits,
         }
     }

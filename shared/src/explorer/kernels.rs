@@ -316,9 +316,6 @@ const MOST_OFF: i32 = (1 << 26) - 1;
 
 /// What costs the time of a decision.
 pub trait Kernels: crate::dsp::Kernels {
-    /// Every table has whitened features: what the methods for others take is left out of the code.
-    const ONLY_FUSED: bool = false;
-
     /// Sets logarithms to 0, the prior.
     fn reset_to_prior(logs: &mut [i32]);
 

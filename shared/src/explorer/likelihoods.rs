@@ -8,7 +8,7 @@ use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
 use crate::features::{Observation, Property};
-use crate::table::{Action, Against, Contents, Gaussian, PACED, mean_step};
+use crate::table::{Action, Against, Contents, Gaussian, mean_step};
 
 /// Most that the likelihood of a slide takes from a logarithm.
 const MOST: i32 = 1 << 26;
@@ -41,10 +41,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         slide: &Observation,
     ) -> Result<(), ObserveError> {
         match action.property {
-            None if K::ONLY_FUSED || self.config.method == Method::Fused => {
-                self.observe_features(action, slide)
-            }
-            _ if K::ONLY_FUSED => Err(ObserveError::Action(action)),
+            None if self.config.method == Method::Fused => self.observe_features(action, slide),
             Some(property) => self.observe_property(action, property, slide),
             None => self.observe_properties(action, slide),
         }
@@ -169,7 +166,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             for (sum, z) in sums.white.iter_mut().zip(&white) {
                 *sum += i32::from(*z);
             }
-            if let Some(pace) = slide.pace.filter(|_| PACED) {
+            if let Some(pace) = slide.pace {
                 sums.pace += i32::from(pace);
                 sums.paces = sums.paces.saturating_add(1);
             }

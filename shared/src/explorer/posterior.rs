@@ -16,7 +16,7 @@ use super::student::ShrinkagePrior;
 use super::whitened;
 use crate::dsp::Plain;
 use crate::features::{PropertySet, Vector};
-use crate::table::{Action, Against, Contents, EARLY, Limits, MAX_ACTIONS, MAX_MOVEMENTS, Table};
+use crate::table::{Action, Against, Contents, Limits, MAX_ACTIONS, MAX_MOVEMENTS, Table};
 use crate::up_to;
 
 /// Logarithm of the posterior, Q16, of a texture that is no candidate. The slides of an exploration make it neither a
@@ -144,7 +144,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.failed = self.table.movements().map(|_| 0).collect();
         self.episode.clear();
         self.log_odds = None;
-        if EARLY && self.config.method == Method::Fused {
+        if self.config.method == Method::Fused {
             // one for each action; those of shorter slides are behind them
             self.novelty_models.truncate(self.actions.len());
         }
@@ -227,7 +227,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         let share = self.config.false_alarm;
         let mut least = limits.limit(against, slides, share);
         // models of shorter slides are behind those of the actions
-        if EARLY && self.novelty_models.len() > self.actions.len() {
+        if self.novelty_models.len() > self.actions.len() {
             for sums in self
                 .episode
                 .iter()
@@ -299,17 +299,10 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         self.whole_slides().map(pace)
     }
 
-    #[cfg(any(test, feature = "early"))]
     fn whole_slides(&self) -> impl Iterator<Item = &MovementSums> {
         let table = self.table;
         let slides = self.episode.iter();
         slides.filter(move |v| table.is_whole(v.movement))
-    }
-
-    /// All slides are whole.
-    #[cfg(not(any(test, feature = "early")))]
-    fn whole_slides(&self) -> impl Iterator<Item = &MovementSums> {
-        self.episode.iter()
     }
 
     /// The most probable texture as things stand, the first of equals: the answer also where no further slide can be made.

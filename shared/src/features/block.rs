@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// P_AC samples in one block.
 pub const BLOCK: usize = 64;
 
-/// What the samples of a tick belong to.
+/// The part of a slide to which the samples of a tick belong.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum SamplePhase {
     /// Nothing.
@@ -40,8 +40,8 @@ pub struct Block {
 }
 
 impl Block {
-    /// The blocks of a movement that is over, from all its samples: P_AC of the still finger, if it was measured, and of the
-    /// slide, and shear at constant speed, in mN.
+    /// The blocks of a movement that is over, from all its samples: P_AC of the still finger, if it was measured, and
+    /// of the slide, and shear at constant speed, in mN.
     pub fn cut<'s>(
         still: &'s [i16],
         steady: Range<u32>,

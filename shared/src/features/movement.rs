@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// One exploratory movement: the contact force that is set before the slide and the speed of the slide.
 ///
-/// Whole millinewtons and micrometres per second, so that a movement in a table, on the link and in a recording's manifest
-/// is the same movement to the bit.
+/// Whole millinewtons and micrometres per second, so that a movement in a table, on the link and in a recording's
+/// manifest is the same movement to the bit.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(try_from = "(u16, u32)", into = "(u16, u32)")]
 pub struct Movement {
@@ -15,7 +15,7 @@ pub struct Movement {
     speed_um_s: u32,
 }
 
-/// Why a force and a speed are no movement of this rig.
+/// The reasons why a force and a speed are not a movement of this rig.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum MovementError {
     /// Contact force in mN outside [`Movement::FORCE_MN`].
@@ -52,8 +52,8 @@ impl From<Movement> for (u16, u32) {
 }
 
 impl Movement {
-    /// Contact forces that a movement may have: a tenth of a newton is 9 counts of P_DC, and over 2 N the skin touches the
-    /// core (fig. 3).
+    /// Contact forces that a movement may have: a tenth of a newton is 9 counts of P_DC, and over 2 N the skin touches
+    /// the core (fig. 3).
     pub const FORCE_MN: core::ops::RangeInclusive<u16> = 100..=2000;
     /// Sliding speeds that a movement may have.
     pub const SPEED_UM_S: core::ops::RangeInclusive<u32> = 5_000..=150_000;
@@ -150,7 +150,8 @@ impl Movement {
         self.force_n() * self.speed_mm_s()
     }
 
-    /// Whether the movement wears the fingerprints off (Results, "Identifying the most useful exploratory movements").
+    /// Returns whether the movement wears the fingerprints off (Results, "Identifying the most useful exploratory
+    /// movements").
     ///
     /// The paper avoids pairs of high sliding power but prints the limit only as grey boxes in fig. 7. Its three chosen
     /// movements all have a = i + k = 6 (12.6 mW); its example of a worn-out one has a = 10 (79.6 mW). Chosen here: the

@@ -24,8 +24,8 @@ pub type Vector = Vec<i16, MAX_FEATURES>;
 pub enum FeatureSet {
     /// Traction in N, and logarithms of band powers.
     Force,
-    /// Mean and standard deviation of P_DC during the slide in units of 100 counts, and logarithms of band powers: for a
-    /// rig without force sensing.
+    /// Mean and standard deviation of P_DC during the slide in units of 100 counts, and logarithms of band powers: for
+    /// a rig without force sensing.
     Pressure,
     /// Logarithms of band powers only.
     Bands,
@@ -47,7 +47,7 @@ impl FeatureSet {
         }
     }
 
-    /// Whether a table may have this set with `features` features in all.
+    /// Returns whether a table may have this set with `features` features in all.
     pub const fn allows(self, features: usize) -> bool {
         match self {
             Self::Properties => features == 3,
@@ -55,7 +55,7 @@ impl FeatureSet {
         }
     }
 
-    /// Whether a rig that measures `measured` can have these features. Every rig has P_AC and P_DC.
+    /// Returns whether a rig that measures `measured` can have these features. Every rig has P_AC and P_DC.
     pub const fn measured_by(self, measured: PropertySet) -> bool {
         match self {
             Self::Force => measured.contains(Property::Traction),
@@ -75,7 +75,7 @@ impl FeatureSet {
     }
 }
 
-/// What one slide says, as it is compared with a table.
+/// The features of one slide, in the form that is compared with a table.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Observation {
     /// The paper's three properties.
@@ -84,7 +84,8 @@ pub struct Observation {
     pub bands: Vec<i16, FUSED_BANDS>,
     /// Mean and standard deviation of P_DC, in steps of 1/1024 of 100 counts.
     pub pressure: Option<[i16; 2]>,
-    /// Natural logarithm of the mean speed in parts of the movement's, in steps of 1/1024; `None` where it was not measured.
+    /// Natural logarithm of the mean speed in parts of the movement's, in steps of 1/1024; `None` where it was not
+    /// measured.
     #[serde(default)]
     pub pace: Option<i16>,
 }

@@ -79,17 +79,17 @@ impl PropertySet {
     /// Those of P_AC, which a rig has whatever moves it: roughness and fineness.
     pub const WITHOUT_SHEAR: Self = Self(0b110);
 
-    /// Whether `property` is in the set.
+    /// Returns whether `property` is in the set.
     pub const fn contains(self, property: Property) -> bool {
         self.0 & (1 << property.index()) != 0
     }
 
-    /// What is in both sets.
+    /// The intersection of both sets.
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
-    /// Whether nothing is in the set.
+    /// Returns whether the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }

@@ -1,4 +1,5 @@
-//! From the samples of one slide to its properties: traction (eq. 14), roughness (eq. 15, 16) and fineness (eq. 18, 19).
+//! From the samples of one slide to its properties: traction (eq. 14), roughness (eq. 15, 16) and fineness (eq. 18,
+//! 19).
 //!
 //! Everything streams: a slide is taken in blocks of any size, and nothing but the final logarithms waits for its end.
 
@@ -20,8 +21,8 @@ pub const FUSED_BANDS: usize = 12;
 /// Their edges, from 17 to 1000 Hz in nearly equal ratios, as half-open ranges of bins.
 pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] =
     [4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
-/// Added to the mean power of a band of them, counts^2 per bin, before the logarithm: what rounding to whole counts adds to
-/// every bin, and a little more.
+/// Added to the mean power of a band of them, counts^2 per bin, before the logarithm: what rounding to whole counts
+/// adds to every bin, and a little more.
 const FUSED_FLOOR: f32 = 0.1;
 
 /// Least share of the background power that a texture's power can be told from it.
@@ -32,8 +33,8 @@ const LEAST_OF_BACKGROUND: f32 = 1.0 / 16.0;
 /// Least power at all in counts^2: what rounding to whole counts adds.
 const LEAST_POWER: f32 = 1.0 / 12.0;
 
-/// Roughness (eq. 16) from the mean band-passed power of the slide and of the still finger, both in counts^2, and whether
-/// it is only an upper bound.
+/// Roughness (eq. 16) from the mean band-passed power of the slide and of the still finger, both in counts^2, and
+/// whether it is only an upper bound.
 ///
 /// A smooth texture's power can come out below the background, where eq. 16 has no value. Power above the background is
 /// therefore taken to be at least a 16th of the background and at least 1/12 counts^2, the least that can be measured.
@@ -43,7 +44,7 @@ pub fn roughness(power: f32, background: f32) -> (f32, bool) {
     (libm::logf(above.max(least)), above < least)
 }
 
-/// Why a slide has no properties. A rig repeats such a slide.
+/// The reasons why a slide has no properties. A rig repeats such a slide.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum SlideError {
     /// The steady window was never set.
@@ -145,9 +146,9 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.lost = other.lost;
     }
 
-    /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which samples
-    /// are at constant speed. What a block says is lost has nothing in its place, nor has a block that does not come: the
-    /// slide has no properties then.
+    /// Takes the next block of the movement: of the still finger, then of the slide, the first of which says which
+    /// samples are at constant speed. What a block says is lost has nothing in its place, nor has a block that does not
+    /// come: the slide has no properties then.
     // one function on the chip: what moves samples in it is judged under its own name (xtask's reasons.rs)
     #[inline(never)]
     pub fn take(&mut self, block: &Block) {
@@ -227,7 +228,7 @@ impl<'p, K: Kernels> Slide<'p, K> {
         *number += samples.len() as u32;
     }
 
-    /// How fast it was, where that was measured: see [`Observation::pace`](super::observation::Observation::pace).
+    /// Sets the measured speed, if any: see [`Observation::pace`](super::observation::Observation::pace).
     pub fn set_pace(&mut self, pace: Option<i16>) {
         self.pace = pace;
     }
@@ -241,17 +242,15 @@ impl<'p, K: Kernels> Slide<'p, K> {
     }
 
     /// Samples of P_AC at constant speed that have come.
-    #[cfg(any(test, feature = "early"))]
     pub fn samples(&self) -> u32 {
         self.spectrum.samples()
     }
 
-    /// The properties of what has come so far, as of a slide whose steady part was not longer; of it so many samples of P_AC must
-    /// be there. The slide goes on as if nobody had looked.
+    /// The properties of what has come so far, as of a slide whose steady part was not longer; of it so many samples of
+    /// P_AC must be there. The slide goes on as if nobody had looked.
     ///
     /// # Errors
     /// See [`SlideError`].
-    #[cfg(any(test, feature = "early"))]
     pub fn look(&mut self, samples: u32) -> Result<Measurement, SlideError> {
         self.measure(samples)
     }
@@ -302,14 +301,15 @@ fn mean_and_sd((sum, squares, number): (i64, u64, u32)) -> Option<(f32, f32)> {
     Some(((sum / n) as f32, libm::sqrt(variance) as f32))
 }
 
-/// What one slide says about a texture.
+/// The measurements of one slide.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Measurement {
     /// The paper's three properties.
     pub properties: Properties,
     /// The texture is at most this rough: its power is lost in the background (see [`roughness`]).
     pub roughness_is_bound: bool,
-    /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not given.
+    /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not
+    /// given.
     pub pdc: Option<(f32, f32)>,
     /// See [`Observation::pace`](super::observation::Observation::pace).
     pub pace: Option<i16>,
@@ -326,8 +326,8 @@ impl Measurement {
         self.ln_powers(BAND_EDGES, 1e-3)
     }
 
-    /// Natural logarithms of the twelve band powers of [`FUSED_EDGES`] in counts^2 per bin, each with 0.1 added: silence has
-    /// a value, and what is far below a count has hardly any.
+    /// Natural logarithms of the twelve band powers of [`FUSED_EDGES`] in counts^2 per bin, each with 0.1 added:
+    /// silence has a value, and what is far below a count has hardly any.
     pub fn fused_bands(&self) -> [f32; FUSED_BANDS] {
         self.ln_powers(FUSED_EDGES, FUSED_FLOOR)
     }

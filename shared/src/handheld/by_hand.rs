@@ -15,7 +15,6 @@ use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::{Turned, Turning};
 use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Fault, Refused, Rig, RigError};
@@ -41,7 +40,9 @@ const CLEARED: u32 = TICKS_HZ;
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Hand {
     /// Whether its finger feels gravity.
-    const FEELS_GRAVITY: bool = false;
+    fn feels_gravity(&self) -> bool {
+        false
+    }
 
     /// Waits for the next hundredth of a second.
     async fn wait(&mut self);
@@ -126,10 +127,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
             memory: 0.0,
             serves: false,
         };
-        #[cfg(any(feature = "turns", test))]
-        {
-            by_hand.handheld.turns = H::FEELS_GRAVITY;
-        }
+        by_hand.handheld.turns = by_hand.hand.feels_gravity();
         by_hand.use_calibration(calibration);
         by_hand
     }
@@ -376,9 +374,8 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
     }
 
     // in images that never do it, a future of it would take flash
-    #[cfg(any(feature = "turns", test))]
     async fn turn_over(&mut self) -> Result<Turned, Failure> {
-        if !H::FEELS_GRAVITY {
+        if !self.hand.feels_gravity() {
             return Err(Failure::OtherProbe);
         }
         self.handheld.ask_to_turn(false);
@@ -501,7 +498,6 @@ pub async fn step<H, K, F, B, E>(
         rig.hand.wait().await;
         match job {
             Job::Calibrate => rig.set_force(memory).await,
-            #[cfg(any(feature = "turns", test))]
             Job::TurnOver => rig.set_gravity(memory).await,
             job => work(job, &mut rig.handheld, memory, events, log).await,
         }

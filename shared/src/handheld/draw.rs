@@ -18,7 +18,6 @@ use self::letters::{Anchor, BOLD, Font, LARGE, SMALL};
 use super::guidance::{Again, Way, ZONE_MN};
 use super::screen::{About, Entry, Row, Screen, Trouble, first_line};
 use super::spelling::{Place, WHEEL};
-use crate::table::PACED;
 
 /// The bar's end, mN.
 const BAR_MN: f32 = 1200.0;
@@ -263,11 +262,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             way,
         } => {
             brush.title("Slide", &count(*slide, *of))?;
-            brush.pace(
-                *progress,
-                if PACED { *way } else { Way::NoSensor },
-                *force_mn,
-            )?;
+            brush.pace(*progress, *way, *force_mn)?;
             brush.force(*force_mn, 48)
         }
         Screen::Lift { slide } => {
@@ -279,7 +274,6 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.centre("the finger", 38, &LARGE)
         }
         Screen::Weigh { mn, force_mn } => brush.weigh(*mn, *force_mn),
-        #[cfg(any(feature = "turns", test))]
         Screen::Turn { over } => brush.turn(*over),
         Screen::Again { why, lift } => {
             brush.title("Again", "")?;
@@ -379,9 +373,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         Screen::About(about) => brush.about_probe(about),
         Screen::Calibrated(Ok(scale)) => brush.scale(scale),
         Screen::Calibrated(Err(why)) => brush.sentence("Force not set", why),
-        #[cfg(any(feature = "turns", test))]
         Screen::Turned(Ok(turned)) => brush.turned(turned),
-        #[cfg(any(feature = "turns", test))]
         Screen::Turned(Err(why)) => brush.sentence("Not turned", why),
     }
 }

@@ -74,7 +74,6 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
         }
         // whoever has the finger does it
         Job::Calibrate => {}
-        #[cfg(any(feature = "turns", test))]
         Job::TurnOver => {}
     }
 }

@@ -6,7 +6,7 @@ use crate::explorer::{
     Answer, Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
-use crate::probe::consider_fused;
+use crate::probe::candidates;
 use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
 /// What a person is asked to do: half a newton, 25 mm/s.
@@ -105,8 +105,9 @@ pub fn judge_at_most<K: Kernels>(
         ..Config::default()
     };
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    let among = reference.as_slice();
-    consider_fused(&mut explorer, PropertySet::default(), config, among)
+    let among = candidates(reference.as_slice(), table.textures());
+    explorer
+        .consider(PropertySet::default(), config, among)
         .map_err(JudgeError::Table)?;
     let action = Action {
         movement: movement(&table).ok_or(JudgeError::Movement)?,

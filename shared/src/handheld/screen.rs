@@ -5,7 +5,6 @@ use heapless::Vec;
 use super::guidance::{Again, Phase, View, Way};
 use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::table::Name;
@@ -108,7 +107,6 @@ pub enum Screen<'a> {
         force_mn: f32,
     },
     /// The finger is to point straight down, or up, and to be still.
-    #[cfg(any(feature = "turns", test))]
     Turn {
         /// It has been still the first way, and is to be turned over.
         over: bool,
@@ -184,7 +182,6 @@ pub enum Screen<'a> {
     /// The force was set by weights, or why not.
     Calibrated(Result<ForceScale, &'a str>),
     /// The accelerometer was turned over, or why it says nothing.
-    #[cfg(any(feature = "turns", test))]
     Turned(Result<Turned, &'a str>),
     /// Nothing: the display is off.
     Dark,

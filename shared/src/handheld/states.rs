@@ -19,7 +19,6 @@ use super::touch::Touch;
 use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::Observation;
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::sensor::pressure::Pressure;
@@ -56,7 +55,6 @@ pub enum Job {
     /// Set the force by weights, and call [`Handheld::calibrated`].
     Calibrate,
     /// Turn the accelerometer over, and call [`Handheld::turned`].
-    #[cfg(any(feature = "turns", test))]
     TurnOver,
 }
 
@@ -96,7 +94,6 @@ enum Page {
     /// The host wants P_DC under a weight of so many mN.
     Weigh(u16),
     /// The finger is to be turned over; it has been still the first way.
-    #[cfg(any(feature = "turns", test))]
     Turn(bool),
     /// A slide was no good; the slides before it stand.
     Again(Again),
@@ -114,7 +111,6 @@ enum Page {
     /// The force was set, or why not.
     Calibrated(Result<ForceScale, &'static str>),
     /// It was turned over, or why not.
-    #[cfg(any(feature = "turns", test))]
     Turned(Result<Turned, &'static str>),
     Dark,
 }
@@ -144,7 +140,6 @@ pub struct Handheld<'p, K> {
     /// Textures of the table.
     textures: u16,
     /// Its finger feels gravity.
-    #[cfg(any(feature = "turns", test))]
     pub(super) turns: bool,
     job: Option<Job>,
     melody: &'static [Note],
@@ -180,7 +175,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             reference: None,
             go: None,
             textures,
-            #[cfg(any(feature = "turns", test))]
             turns: false,
             job: None,
             melody: &[],
@@ -310,9 +304,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             | Page::Again(_)
             | Page::Thinking
             | Page::Verdict => true,
-            #[cfg(any(feature = "turns", test))]
             Page::Turn(_) => true,
-            #[cfg(any(feature = "turns", test))]
             Page::Turned(_) => false,
             // it may come back
             Page::Fault(trouble) => !matches!(trouble, Trouble::Memory(_)),
@@ -435,9 +427,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             Page::Fault(trouble) => Screen::Fault(trouble),
             Page::About => Screen::About(about.clone()),
             Page::Calibrated(done) => Screen::Calibrated(*done),
-            #[cfg(any(feature = "turns", test))]
             Page::Turn(over) => Screen::Turn { over: *over },
-            #[cfg(any(feature = "turns", test))]
             Page::Turned(done) => Screen::Turned(*done),
             Page::Dark => Screen::Dark,
         }
@@ -448,7 +438,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
             list,
             judgement: self.judgement.as_ref(),
             textures: self.textures,
-            #[cfg(any(feature = "turns", test))]
             turns: self.turns,
         }
     }

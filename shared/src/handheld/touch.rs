@@ -12,7 +12,6 @@ use crate::dsp::Plan;
 use crate::explorer::Kernels;
 use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
-use crate::table::PACED;
 
 /// Samples of a channel that are looked at together: 10 ms.
 const LOOK: usize = 22;
@@ -166,14 +165,12 @@ impl<'p, K: Kernels> Touch<'p, K> {
 
     /// Takes a reading of the sensor of motion: one every 10 ms. Without them the speed is not known.
     pub fn moved(&mut self, moved: Moved) {
-        if PACED {
-            self.speed.take(moved);
-        }
+        self.speed.take(moved);
     }
 
     /// Whether the probe moves; `None` where no sensor sees that.
     fn moves(&self) -> Option<bool> {
-        if PACED { self.speed.moves() } else { None }
+        self.speed.moves()
     }
 
     /// The slide that was good last, until the finger is pressed again.
@@ -224,7 +221,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
     }
 
     fn way(&self) -> Way {
-        if !PACED || !self.speed.is_there() {
+        if !self.speed.is_there() {
             return Way::NoSensor;
         }
         let seconds = (COMING_UP + STEADY) as f32 / RATE_HZ as f32;
@@ -489,9 +486,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             0
         };
         if self.moves().unwrap_or(self.begins >= BEGINS) {
-            if PACED {
-                self.speed.begin();
-            }
+            self.speed.begin();
             self.tenths.clear();
             self.phase = Phase::Sliding;
             (self.still_mean, self.samples, self.stopped, self.tenth) = (mean, 0, 0, 0.0);
@@ -516,7 +511,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         };
         self.put(&phase, &self.about_rest());
         let steady = self.samples >= COMING_UP;
-        if PACED && self.samples == COMING_UP {
+        if self.samples == COMING_UP {
             self.speed.steady();
         }
         let force_mn = self.force_mn();
@@ -562,10 +557,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
         }
         let last = core::mem::take(&mut self.blocks).end(0);
         self.take(last);
-        if PACED {
-            let seconds = STEADY as f32 / RATE_HZ as f32;
-            self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
-        }
+        let seconds = STEADY as f32 / RATE_HZ as f32;
+        self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
         let mut slide = Slide::<K>::new(self.plan, MOVEMENT);
         slide.adopt(&self.slide);
         match slide.finish() {

@@ -10,7 +10,6 @@ use crate::probe::calibrate::keep;
 use crate::probe::seams::{RigHandle, StoredBytes};
 use crate::rig::RigError;
 use crate::rig::calibration::RigCalibration;
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::wire::Failure;
@@ -64,7 +63,6 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
     }
 
     /// Has the person turn the finger over, keeps what a count of acceleration is then, and shows that.
-    #[cfg(any(feature = "turns", test))]
     pub(super) async fn set_gravity<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
         memory: &mut Memory<'_, F, B>,
@@ -77,7 +75,6 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
         self.handheld.turned(done);
     }
 
-    #[cfg(any(feature = "turns", test))]
     async fn turn_and_keep<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
         memory: &mut Memory<'_, F, B>,

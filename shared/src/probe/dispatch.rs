@@ -12,7 +12,6 @@ use crate::dsp::Plan;
 use crate::explorer::{Answer, Kernels};
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::table::is_false_alarm;
 use crate::wire::{Command, Event, Failure, Request, Status};
@@ -34,7 +33,6 @@ pub const fn turn(command: &Command, busy: bool) -> Turn {
         Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
             Turn::Now
         }
-        #[cfg(any(feature = "arm", test))]
         Command::Arm(_) => Turn::Now,
         _ if busy => Turn::Busy,
         _ => Turn::Queue,
@@ -57,8 +55,12 @@ pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
                 Command::Status => panel.tell(Event::Status(status(panel))),
                 Command::Stop => panel.stop(busy),
                 Command::Stream(on) => panel.stream(on),
-                #[cfg(any(feature = "arm", test))]
-                Command::Arm(report) => panel.arm(report),
+                Command::Arm(report) if !panel.arm(report) => {
+                    let why = Failure::OtherProbe;
+                    panel.tell(Event::Refused { id, why });
+                    return turn;
+                }
+                Command::Arm(_) => {}
                 _ => panel.tell(told(&panel.rig().calibration)),
             }
             panel.tell(Event::Done(id));
@@ -240,9 +242,6 @@ where
                 events.tell(Event::Weighed { mn: *mn, counts });
                 Ok(())
             }
-            #[cfg(not(any(feature = "turns", test)))]
-            Command::TurnOver => Err(Failure::OtherProbe),
-            #[cfg(any(feature = "turns", test))]
             Command::TurnOver => {
                 let Turned {
                     g_counts,
@@ -268,7 +267,6 @@ where
             Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
                 Ok(())
             }
-            #[cfg(any(feature = "arm", test))]
             Command::Arm(_) => Ok(()),
         }
     }

@@ -4,7 +4,7 @@ use crate::dsp::Plan;
 use crate::explorer::{ExpectedOutcome, Explorer, Kernels, Verdict, Verification};
 use crate::features::{Measurement, Slide};
 use crate::rig::{MAX_REJECTED, Rig, RigError};
-use crate::table::{Action, EARLY};
+use crate::table::Action;
 use crate::wire::Failure;
 pub use crate::wire::Rejection;
 
@@ -158,7 +158,7 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
                     Err(why) => Rejection::Observe(why),
                     Ok(()) => {
                         rejected = 0;
-                        if EARLY && let Some(length) = length {
+                        if let Some(length) = length {
                             tell(ExplorationStep::Early(length.ms));
                         }
                         let posterior = explorer.posterior();

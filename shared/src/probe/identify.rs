@@ -6,11 +6,10 @@ use heapless::Vec;
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
 use crate::explorer::{
-    self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, Kernels, Method,
+    self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, Kernels,
 };
-use crate::features::PropertySet;
 use crate::rig::{Rig, RigError};
-use crate::table::{Contents, MAX_TEXTURES, Name, PACED, Table};
+use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
@@ -42,13 +41,10 @@ where
         }
     }
     let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
-    if K::ONLY_FUSED {
-        consider_fused(&mut explorer, rig.measures(), config, &wanted.among)
-    } else {
-        let candidates = candidates(&wanted.among, table.textures());
-        explorer.consider(rig.measures(), config, candidates)
-    }
-    .map_err(Failure::Explorer)?;
+    let candidates = candidates(&wanted.among, table.textures());
+    explorer
+        .consider(rig.measures(), config, candidates)
+        .map_err(Failure::Explorer)?;
     let mut random = Random::new(wanted.seed);
     let mut slide: u8 = 1;
     let verdict = explore(
@@ -69,7 +65,7 @@ where
             }
             ExplorationStep::Early(ms) => tell(Event::Early(ms)),
             ExplorationStep::Measured(action, measurement, posterior) => {
-                if PACED && let Some(pace) = measurement.pace {
+                if let Some(pace) = measurement.pace {
                     tell(Event::Pace(pace));
                 }
                 tell(Event::SlideReport {
@@ -112,32 +108,9 @@ where
 }
 
 /// The textures that it may be; none stands for all.
-fn candidates(among: &[u16], textures: u16) -> impl Iterator<Item = u16> {
+pub(crate) fn candidates(among: &[u16], textures: u16) -> impl Iterator<Item = u16> {
     let all = if among.is_empty() { 0..textures } else { 0..0 };
     among.iter().copied().chain(all)
-}
-
-/// Prepares an empty explorer for a table with whitened features; what the other methods take is left out of the code.
-///
-/// # Errors
-/// [`ExplorerError::Method`]: another method is wanted; and those of [`Explorer::among`].
-#[inline(never)]
-pub(crate) fn consider_fused<K: Kernels>(
-    explorer: &mut Explorer<'_, MAX_TEXTURES, K>,
-    measured: PropertySet,
-    config: Config,
-    among: &[u16],
-) -> Result<(), ExplorerError> {
-    if config.method != Method::Fused {
-        return Err(ExplorerError::Method(config.method));
-    }
-    let config = Config {
-        // known while compiling
-        method: Method::Fused,
-        ..config
-    };
-    let candidates = candidates(among, explorer.table().textures());
-    explorer.consider(measured, config, candidates)
 }
 
 /// The event of a verdict.

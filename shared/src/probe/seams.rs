@@ -3,7 +3,6 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::status::{RigState, TableInUse};
-#[cfg(any(feature = "arm", test))]
 use crate::rig::arm::ArmReport;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
@@ -131,9 +130,10 @@ pub trait Panel {
     /// Stops what is being done now. `all`: also what would come after it, until the request is over.
     fn stop(&mut self, all: bool);
 
-    /// The arm that moves the finger says this.
-    #[cfg(any(feature = "arm", test))]
-    fn arm(&mut self, _report: ArmReport) {}
+    /// Takes what the arm that moves the finger says; `false`: no arm moves it.
+    fn arm(&mut self, _report: ArmReport) -> bool {
+        false
+    }
 
     /// Whether raw samples are wanted from the next movement on.
     fn stream(&mut self, on: bool);

@@ -12,24 +12,20 @@ use crate::dsp::Kernels;
 use crate::features::{Block, Blocks, Movement, PropertySet, SamplePhase, Slide};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
-#[cfg(any(feature = "arm", test))]
 use crate::rig::over_link::RigOverLink;
 use crate::rig::pins::Outputs;
 use crate::rig::skin::SkinCare;
 use crate::rig::timeout::{MovementTimeout, Wait};
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::{Turned, Turning};
 use crate::rig::weigh::{LOOKS_HZ, Weighing};
 use crate::rig::{Ended, Enough, Phase, Refused, Rig, RigError, most_mn};
 use crate::store::Store;
-use crate::table::EARLY;
 use crate::wire::{Event, Failure, MemoryError, Prompt};
 
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
 const _: () = assert!(LOOK_MS * LOOKS_HZ == 1000);
 /// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight turns, too.
-#[cfg(any(feature = "turns", test))]
 const TURNED_MN: u16 = 1000;
 /// A weight is waited for as long, looks.
 const PATIENCE: u32 = 60 * LOOKS_HZ;
@@ -96,7 +92,6 @@ impl RigCommand {
     }
 }
 
-#[cfg(any(feature = "arm", test))]
 impl RigCommand {
     /// Has a rig do it that an arm moves.
     ///
@@ -213,7 +208,6 @@ enum Asked {
     /// To lay a weight of so many mN on it: counts above the air. It is over when the weight was taken away again.
     Weight(u16, Weighing, Option<f32>),
     /// To turn it over.
-    #[cfg(any(feature = "turns", test))]
     Turn(Turning, Option<Turned>),
 }
 
@@ -222,21 +216,17 @@ impl Asked {
         match self {
             Self::Weight(mn, weighing, None) if weighing.wants_weight() => Prompt::Weigh(*mn),
             Self::Weight(..) => Prompt::Lift,
-            #[cfg(any(feature = "turns", test))]
             Self::Turn(turning, _) if turning.wants_turn() => Prompt::TurnOver,
-            #[cfg(any(feature = "turns", test))]
             Self::Turn(..) => Prompt::Still,
         }
     }
 
     /// Looks at the finger; whether it is over.
-    #[cfg_attr(not(any(feature = "turns", test)), expect(unused_variables))]
     fn look(&mut self, rig: &RigState, gravity: Option<f32>) -> bool {
         let counts = rig.force_mn / rig.calibration.pressure.force_mn_per_count;
         match self {
             Self::Weight(_, weighing, weighed @ None) => *weighed = weighing.take(counts),
             Self::Weight(_, weighing, Some(_)) => return weighing.is_air(counts),
-            #[cfg(any(feature = "turns", test))]
             Self::Turn(turning, turned) => {
                 *turned = gravity.and_then(|g| turning.take(g));
                 return turned.is_some();
@@ -408,7 +398,6 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         }
     }
 
-    #[cfg(any(feature = "turns", test))]
     async fn turn_over(&mut self) -> Result<Turned, Failure> {
         if self.servo.gravity().is_none() {
             return Err(Failure::OtherProbe);
@@ -481,11 +470,11 @@ impl<S: Servo> Rig for ServoRig<S> {
         let streams = self.servo.streams();
         let mut over = false;
         let mut take = |servo: &mut S, block: Block, last: bool| {
-            if EARLY && over {
+            if over {
                 slide.lose(block.lost);
             } else {
                 slide.take(&block);
-                over = EARLY && !last && !block.still && enough(slide);
+                over = !last && !block.still && enough(slide);
                 if over {
                     servo.end_slide();
                 }

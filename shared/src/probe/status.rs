@@ -2,7 +2,6 @@
 
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
-#[cfg(any(feature = "arm", test))]
 use crate::rig::over_link::RigOverLink;
 use crate::rig::skin::SkinCare;
 use crate::rig::{Ended, Phase};
@@ -80,7 +79,6 @@ impl RigState {
     }
 
     /// The state after a tick of a rig that an arm moves. Where the arm is, it alone knows.
-    #[cfg(any(feature = "arm", test))]
     pub fn over_link(rig: &mut RigOverLink, ended: Option<Ended>) -> Self {
         Self {
             phase: rig.phase(),
@@ -135,7 +133,6 @@ impl Watch {
     const LIVE: u32 = 10;
 
     /// The same for an arm, which presses by the force that is reported: 10 ms.
-    #[cfg(any(feature = "arm", test))]
     const LIVE_FOR_ARM: u32 = 2;
 
     /// Looks at the rig.
@@ -144,7 +141,6 @@ impl Watch {
     }
 
     /// Looks at a rig that an arm moves.
-    #[cfg(any(feature = "arm", test))]
     pub fn look_for_arm(&mut self, rig: &RigState, tell: impl FnMut(Event)) {
         self.look_every::<{ Self::LIVE_FOR_ARM }>(rig, tell);
     }

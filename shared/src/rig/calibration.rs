@@ -160,9 +160,7 @@ impl RigCalibration {
             return Err(RigCalibrationError::Pressure(CalibrationError::Scale));
         }
         let mg = &self.pressure.pac_pa_per_count;
-        // in images of other fingers it is not used
-        let turns = cfg!(any(feature = "turns", test));
-        if turns && self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
+        if self.turned != 0 && !turning::PLAUSIBLE_MG.contains(mg) {
             return Err(RigCalibrationError::Turned);
         }
         let (standstill, per_mm_s) = self.unloaded_a;

@@ -24,20 +24,19 @@ pub struct Row {
 }
 
 const BOTH: &str = "stage motor braked, finger lifted to the limit switch";
-#[cfg(any(feature = "arm", test))]
 const ARM: &str = "the arm is told to stop and to lift the finger, again and again; its line of permission falls where it does not";
 const ALL: &str = "every movement, until reset";
 
 macro_rules! faults {
-    ($($(#[$doc:meta])* $fault:ident $(of $feature:literal)?, $name:literal, $detected:literal, $deadline:literal, $stops:expr, $refused:expr, $recovery:literal;)*) => {
+    ($($(#[$doc:meta])* $fault:ident, $name:literal, $detected:literal, $deadline:literal, $stops:expr, $refused:expr, $recovery:literal;)*) => {
         /// A fault of the rig. Messages and logs number them in this order.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
         pub enum Fault {
-            $($(#[$doc])* $(#[cfg(any(feature = $feature, test))])? $fault),*
+            $($(#[$doc])* $fault),*
         }
 
         /// Every fault, once, in the order of [`Fault`].
-        pub const FAULTS: &[Row] = &[$($(#[cfg(any(feature = $feature, test))])? Row {
+        pub const FAULTS: &[Row] = &[$(Row {
             fault: Fault::$fault,
             name: $name,
             detected: $detected,
@@ -47,12 +46,12 @@ macro_rules! faults {
             recovery: $recovery,
         }),*];
 
-        const NAMES: &[&str] = &[$($(#[cfg(any(feature = $feature, test))])? $name),*];
-        const RECOVERIES: &[&str] = &[$($(#[cfg(any(feature = $feature, test))])? $recovery),*];
+        const NAMES: &[&str] = &[$($name),*];
+        const RECOVERIES: &[&str] = &[$($recovery),*];
     };
 }
 
-// the fault (of images with this feature only), its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
+// the fault, its name, how it is detected, the deadline in ms, what stops, what is refused, what the user does
 faults! {
     /// The finger is pressed too hard.
     ForceHigh, "force too high", "P_DC means more than 2.05 N, mean of 10 ms made up for its lag; it bends: that is 2.1 N. While a rig that was set to it presses more than 1.26 N, 2.1 N: that is 2.18 N. Or it rises by 8 counts while the lever looks for its switch, or while the stage moves under a lifted finger; or by 40 while the rig waits with its finger lifted", 12,
@@ -109,13 +108,13 @@ faults! {
     PressureDead, "pressure dead", "P_AC shows contact and P_DC does not rise within 0.5 mm, or no longer rises while P_AC shows that the pressure does, or no contact 1 mm below that of the last press on this sample", 2,
         BOTH, ALL, "look whether the finger is up, and turn the lever's knob until it is; check the fingertip and the sensor's P_DC, then reset";
     /// The arm that moves the finger says nothing any more. New in version 11.
-    ArmSilent of "arm", "arm silent", "no word of the arm about what it was asked for in 0.5 s", 502, ARM, ALL,
+    ArmSilent, "arm silent", "no word of the arm about what it was asked for in 0.5 s", 502, ARM, ALL,
         "look whether the finger is up, and move the arm away by its own controls; check that its program runs, then reset";
     /// The arm does not stop when it is to. New in version 11.
-    ArmRuns of "arm", "arm does not stop", "0.2 s after a stop was demanded the force is over the limit still, or after 2 s the finger still presses", 202, ARM, ALL,
+    ArmRuns, "arm does not stop", "0.2 s after a stop was demanded the force is over the limit still, or after 2 s the finger still presses", 202, ARM, ALL,
         "press the arm's own emergency stop, and move it away by its controls; then reset";
     /// The arm did something else than it was asked for. New in version 11.
-    ArmOff of "arm", "arm off its order", "it says that it presses and P_DC is more than 2 counts and 10 % off the force; it says that it is lifted and P_DC is not; its slide was 5 % shorter, longer, slower or faster than was asked for, by what it says or by the probe's clock; it was not done in its time; or it says that it cannot", 2,
+    ArmOff, "arm off its order", "it says that it presses and P_DC is more than 2 counts and 10 % off the force; it says that it is lifted and P_DC is not; its slide was 5 % shorter, longer, slower or faster than was asked for, by what it says or by the probe's clock; it was not done in its time; or it says that it cannot", 2,
         ARM, ALL, "look at the arm and the sample, and at what the arm's program says; then reset";
 }
 
@@ -134,7 +133,6 @@ impl Fault {
     /// Whether it can come of one movement or pass by itself: a rig that has homed after it may go on without a person. Each
     /// press begins with its checks of the zero, and every guard stays on.
     pub const fn is_of_the_movement(self) -> bool {
-        #[cfg(any(feature = "arm", test))]
         if matches!(self, Self::ArmOff) {
             return true;
         }

@@ -15,7 +15,6 @@ const STEADY_S: f32 = 3.0;
 /// After the ramp the servo has this long to settle before samples count, s.
 const STEADY_MARGIN_S: f32 = 0.2;
 /// A word of an arm may be so long on its way, ms: that is left out at the end of a slide over the link.
-#[cfg(any(feature = "arm", test))]
 pub(super) const LINK_MS: u32 = 150;
 /// P_AC words of a slide may differ from what its time holds by so many.
 const WORDS_OFF: u32 = 4;
@@ -81,7 +80,6 @@ impl Run {
 
     /// The slide of a movement that an arm makes, and its length at constant speed, mm. Its time begins with the arm's word that the
     /// speed is constant, and ends before it would be over if that came late.
-    #[cfg(any(feature = "arm", test))]
     pub(super) fn over_link(movement: Movement) -> (Self, f32) {
         let length_mm = (movement.speed_mm_s() * STEADY_S).min(SlidePath::LONGEST_MM);
         let path = SlidePath::new(movement, length_mm);
@@ -96,7 +94,6 @@ impl Run {
     }
 
     /// Ms at constant speed of a slide over the link.
-    #[cfg(any(feature = "arm", test))]
     pub(super) fn slide_ms(&self) -> u32 {
         self.steady_ms.end + LINK_MS
     }

@@ -1,13 +1,14 @@
-//! TI's ADS1220, a converter of 24 bits, with a load cell of a full bridge on AIN0 and AIN1, whose supply is its reference.
+//! TI's ADS1220, a converter of 24 bits, with a load cell of a full bridge on AIN0 and AIN1, whose supply is its
+//! reference.
 //!
-//! Sources: DS is the data sheet SBAS501 by its sections; DRV are public drivers that name the same registers (Protocentral_ADS1220,
-//! jrleeman/ADS1220_Arduino).
+//! Sources: DS is the data sheet SBAS501 by its sections; DRV are public drivers that name the same registers
+//! (Protocentral_ADS1220, jrleeman/ADS1220_Arduino).
 
 use embedded_hal::spi::MODE_1;
 
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
-/// How it is wired.
+/// The port: chip select, mode and clock.
 pub const PORT: Port = Port {
     name: "ADS1220 of the load cell",
     // DS 8.5.1: mode 1 only
@@ -64,6 +65,12 @@ const fn step(
     }
 }
 
+/// The steps of [`START`] that show whether it is there.
+pub const CHECK: [StartStep; 3] = {
+    let [reset, write, read, _] = START;
+    [reset, write, read]
+};
+
 /// From power-up to the first slot.
 pub const START: [StartStep; 4] = [
     // DS 8.5.3.1: 50 us and 32 clocks, here twice as long
@@ -94,7 +101,7 @@ pub const fn code(answer: [u8; 3]) -> i32 {
     i32::from_be_bytes([upper, middle, lower, 0]) >> 8
 }
 
-/// Whether a conversion is at an end of the range: an input that nothing drives.
+/// Returns whether a conversion is at an end of the range: an input that nothing drives.
 pub const fn is_clipped(code: i32) -> bool {
     code == 0x7F_FFFF || code == -0x80_0000
 }

@@ -1,7 +1,8 @@
 //! A finger of a piezo disc and a load cell, amplified, on one MCP3202: what anyone can solder.
 //!
-//! P_AC: a piezo disc behind the skin, two operational amplifiers, a band-pass of 10 to 1040 Hz around 1.65 V, on channel 0. P_DC: a
-//! bar load cell of 1 kg behind an INA125, on channel 1. The shape is the paper's own circuit (Methods, "BioTac").
+//! P_AC: a piezo disc behind the skin, two operational amplifiers, a band-pass of 10 to 1040 Hz around 1.65 V, on
+//! channel 0. P_DC: a bar load cell of 1 kg behind an INA125, on channel 1. The shape is the paper's own circuit
+//! (Methods, "BioTac").
 //!
 //! The converter samples while it is read (data sheet DS21034, 5.1), the BioTac when it is asked: in split use the two
 //! differ by the gap, which shifts both channels alike.
@@ -20,9 +21,10 @@ impl PressureSensor for Analog {
     type Error = AnalogError;
     const MODEL: FingerModel = FingerModel {
         name: FingerName::Analog,
-        // The cell: 1 mV/V at 1 kg and 3.3 V are 0.3365 mV/N; times the INA125's gain of 208, 4 + 60 kOhm / 294 Ohm (its data sheet,
-        // "Setting the gain"), 70 mV/N; a count is 0.806 mV: 11.5 mN. Its zero is put to 1000 counts, so that a cell that is wired
-        // the wrong way round is seen to go down. The disc's gain is set so that its counts are the paper's.
+        // The cell: 1 mV/V at 1 kg and 3.3 V are 0.3365 mV/N; times the INA125's gain of 208, 4 + 60 kOhm / 294 Ohm
+        // (its data sheet, "Setting the gain"), 70 mV/N; a count is 0.806 mV: 11.5 mN. Its zero is put to 1000 counts,
+        // so that a cell that is wired the wrong way round is seen to go down. The disc's gain is set so that its
+        // counts are the paper's.
         calibration: Calibration {
             pdc_no_contact: 1000.0,
             ..Calibration::PAPER
@@ -30,7 +32,8 @@ impl PressureSensor for Analog {
         pac_shows_force: true,
         at_rest: AtRest {
             pac_noise_counts: (0.4, 8.0),
-            // a cell's zero is off by a tenth of its range or less, 85 counts, and the tip on it weighs 10 g at most, 9 counts
+            // a cell's zero is off by a tenth of its range or less, 85 counts, and the tip on it weighs 10 g at most, 9
+            // counts
             pdc_counts: (850.0, 1150.0),
         },
     };
@@ -58,7 +61,7 @@ impl PressureSensor for Analog {
     }
 }
 
-/// Why an answer is no sample.
+/// The reasons why an answer is not a sample.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum AnalogError {
     /// The converter does not answer.

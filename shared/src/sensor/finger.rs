@@ -1,12 +1,12 @@
-//! What the rest of the core has to know of a finger: its name, its constants before anybody has measured them, and what it shows
-//! when nobody touches it.
+//! The facts about a finger that the rest of the core needs: its name, its constants before anybody has measured them,
+//! and its signals at rest.
 
 use core::fmt;
 use core::str::FromStr;
 
 use crate::sensor::pressure::Calibration;
 
-/// The fingers there are, by the names that commands, tables and messages have for them.
+/// The fingers, by their names in commands, tables and messages.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub enum FingerName {
     /// SynTouch's BioTac.
@@ -58,16 +58,16 @@ pub struct UnknownFinger;
 pub struct FingerModel {
     /// Its name.
     pub name: FingerName,
-    /// The constants of a typical one, for as long as nobody has measured this one's.
+    /// The constants of a typical one, until this one's are measured.
     pub calibration: Calibration,
-    /// Whether P_AC is P_DC's pressure behind a high-pass of 10 Hz, so that it shows a press which P_DC does not. Where it is
-    /// not, a sprung mount is what protects the finger from a P_DC that says nothing.
+    /// True if P_AC is P_DC's pressure behind a high-pass of 10 Hz, so that it shows a press which P_DC does not.
+    /// Otherwise only a sprung mount protects the finger from a dead P_DC.
     pub pac_shows_force: bool,
-    /// What it shows when nobody touches it.
+    /// The signals when nobody touches it.
     pub at_rest: AtRest,
 }
 
-/// What a sound finger shows in the air.
+/// The limits of a sound finger's signals in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct AtRest {
     /// Least and most noise of P_AC, counts rms: less is a dead converter, more is a bad ground.
@@ -77,8 +77,8 @@ pub struct AtRest {
 }
 
 impl FingerModel {
-    /// A force in counts of P_DC of a typical finger of this kind, for thresholds: they do not follow the calibration of one
-    /// piece, which may be wrong.
+    /// A force in counts of P_DC of a typical finger of this kind, for thresholds: they do not follow the calibration
+    /// of one piece, which may be wrong.
     pub const fn counts(&self, mn: f32) -> f32 {
         mn / self.calibration.force_mn_per_count
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct FingerCode(pub u8);
 
-/// What a number without a name is called, before the number.
+/// The prefix of a number that has no name.
 const NAMELESS: &str = "finger-";
 
 impl FingerCode {

@@ -1,7 +1,8 @@
 //! ST's IIS3DWB, an accelerometer of 16 bits that is flat to 6 kHz, along one axis.
 //!
 //! Sources, cited by these names:
-//! - REG: ST's public register header iis3dwb_reg.h (STMicroelectronics/iis3dwb-pid), which has every address and bit used here;
+//! - REG: ST's public register header iis3dwb_reg.h (STMicroelectronics/iis3dwb-pid), which has every address and bit
+//!   used here;
 //! - EX: ST's example beside it, iis3dwb_read_data_polling.c;
 //! - DS: data sheet DS12569; AN: application note AN5444.
 //!
@@ -11,7 +12,7 @@ use embedded_hal::spi::MODE_3;
 
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
-/// How it is wired.
+/// The port: chip select, mode and clock.
 pub const PORT: Port = Port {
     name: "IIS3DWB accelerometer",
     // DS: clock idle high, sampled on the second edge
@@ -33,7 +34,7 @@ const CTRL6_C: u8 = 0x15;
 const CTRL8_XL: u8 = 0x17;
 const OUTZ_L_A: u8 = 0x2C;
 
-/// Who it is (REG: IIS3DWB_ID).
+/// The identity register's value (REG: IIS3DWB_ID).
 const IDENTITY: u8 = 0x7B;
 /// CTRL3_C: software reset (REG: sw_reset).
 const RESET: u8 = 0x01;
@@ -47,7 +48,7 @@ const LOW_PASS: u8 = 0x40;
 const Z_ALONE: u8 = 0x03;
 const IN_ALL: u8 = 0x01;
 
-/// What an LSB is at +-2 g, g (REG: iis3dwb_from_fs2g_to_mg).
+/// The value of an LSB at +-2 g, g (REG: iis3dwb_from_fs2g_to_mg).
 pub const G_PER_LSB: f32 = 0.061e-3;
 
 /// A transaction with the accelerometer, which is part 0 of its finger.
@@ -72,6 +73,12 @@ const fn read(out: &'static [u8], expect: &'static [(u8, u8)]) -> StartStep {
     }
 }
 
+/// The step of [`START`] that shows whether it is there.
+pub const CHECK: [StartStep; 1] = {
+    let [identity, ..] = START;
+    [identity]
+};
+
 /// From power-up to the first slot.
 pub const START: [StartStep; 13] = [
     read(&[READ | WHO_AM_I, 0], &[(0xFF, IDENTITY)]),
@@ -94,10 +101,10 @@ pub const START: [StartStep; 13] = [
 /// Reads Z: two bytes, the lower first, and the reserved one behind them, so that the number of bytes is even.
 pub const READ_Z: Transaction = access(&[READ | OUTZ_L_A, 0, 0, 0], 3);
 
-/// Reads whether it is on: after a brown-out it has its identity and is off.
+/// Asks whether it is on: after a brown-out it has its identity and is off.
 pub const READ_ON: Transaction = access(&[READ | CTRL1_XL, 0], 1);
 
-/// Whether the answer to [`READ_ON`] says so, with the range and the filter as they were set.
+/// Returns whether the answer to [`READ_ON`] says so, with the range and the filter as they were set.
 pub const fn is_on(ctrl1_xl: u8) -> bool {
     ctrl1_xl & 0xEE == ON & 0xEE
 }

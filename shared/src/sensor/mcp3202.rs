@@ -1,24 +1,24 @@
-//! Microchip's MCP3202, a converter of two channels and 12 bits: what is asked, and what its answers mean.
+//! Microchip's MCP3202, a converter of two channels and 12 bits: its requests and answers.
 
 use embedded_hal::spi::MODE_0;
 
 use crate::sensor::pressure::Counts;
 use crate::sensor::slot::{Port, Transaction};
 
-/// How it is wired.
+/// The port: chip select, mode and clock.
 pub const PORT: Port = Port {
     name: "MCP3202",
     // also 3 (DS21034, features)
     mode: MODE_0,
-    // Upper end: 50000 samples a second at 2.7 V, 18 clocks each (DS21034); one read of 24 clocks takes 27 us. Lower end:
-    // the held charge leaks away within 1.2 ms (DS21034, 6.2).
+    // Upper end: 50000 samples a second at 2.7 V, 18 clocks each (DS21034); one read of 24 clocks takes 27 us. Lower
+    // end: the held charge leaks away within 1.2 ms (DS21034, 6.2).
     clock_hz: 10_000..=900_000,
 };
 
 /// A conversion of channel 0, and one of channel 1.
 ///
-/// Start bit at the end of byte 0, then single-ended, the channel, and most significant bit first (DS21034, fig. 6-1 and
-/// table 5-1). Chip select has to go high between conversions (DS21034, 3.2).
+/// Start bit at the end of byte 0, then single-ended, the channel, and most significant bit first (DS21034, fig. 6-1
+/// and table 5-1). Chip select has to go high between conversions (DS21034, 3.2).
 pub const CONVERSIONS: [Transaction; 2] = [
     Transaction::first_port(&[0x01, 0b1010_0000, 0x00], 2, 1),
     Transaction::first_port(&[0x01, 0b1110_0000, 0x00], 2, 1),

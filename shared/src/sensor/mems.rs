@@ -1,7 +1,9 @@
-//! A finger of an IIS3DWB accelerometer that floats in silicone behind the skin, and of a bar load cell of 1 kg on an ADS1220.
+//! A finger of an IIS3DWB accelerometer that floats in silicone behind the skin, and of a bar load cell of 1 kg on an
+//! ADS1220.
 //!
-//! Z is read in each of the 4400 slots; a half-band filter takes it to 2200 Hz, and a high-pass of 10 Hz takes gravity and tilt
-//! away, and most of a hand's tremor. The cell is read in every fourth slot, 1100 times a second, and held between.
+//! Z is read in each of the 4400 slots; a half-band filter takes it to 2200 Hz, and a high-pass of 10 Hz takes gravity
+//! and tilt away, and most of a hand's tremor. The cell is read in every fourth slot, 1100 times a second, and held
+//! between.
 
 use crate::sensor::driver::{BadWord, GRAVITY_PARTS, PressureSensor};
 use crate::sensor::finger::{AtRest, FingerModel, FingerName};
@@ -9,7 +11,8 @@ use crate::sensor::pressure::{Calibration, Channel, Counts, Pressure, RATE_HZ};
 use crate::sensor::slot::{Port, StartStep, Transaction};
 use crate::sensor::{ads1220, iis3dwb};
 
-/// A count of P_AC is so many LSBs of acceleration: 16, 0.98 mg. Its noise of 60 ug/sqrt(Hz) is then 2 counts (DS12569).
+/// A count of P_AC is so many LSBs of acceleration: 16, 0.98 mg. Its noise of 60 ug/sqrt(Hz) is then 2 counts
+/// (DS12569).
 const PAC_LSB: i32 = 16;
 /// P_AC at rest.
 const PAC_REST: i32 = 2048;
@@ -20,8 +23,9 @@ const PDC_BALANCE: i32 = 1000;
 /// Force of a count: 1 mV/V at 1 kg are 0.102 mV/V for each newton, 109 492 LSB, 106.9 counts.
 const MN_PER_COUNT: f32 = 9.806_65e6 * (1 << PDC_SHIFT) as f32 / ads1220::LSB_PER_UNIT;
 
-/// Half of a half-band filter of 15 taps, from its end to the tap before the middle, every other one being 0; in 1/32768.
-/// Kaiser's window with beta 3: flat within 0.2 dB to 800 Hz, -3.5 dB at 1025 Hz, and 32 dB down from 1400 Hz on.
+/// Half of a half-band filter of 15 taps, from its end to the tap before the middle, every other one being 0; in
+/// 1/32768. Kaiser's window with beta 3: flat within 0.2 dB to 800 Hz, -3.5 dB at 1025 Hz, and 32 dB down from 1400 Hz
+/// on.
 const SIDE: [i32; 4] = [-306, 1048, -2766, 10_197];
 const MIDDLE: i32 = 16_422;
 const TAPS: usize = 15;
@@ -31,12 +35,12 @@ pub const DELAY_SLOTS: u32 = TAPS as u32 / 2;
 /// Share of the high-pass's slow part that a sample makes, in 1/32768: 10 Hz at 2200 samples a second.
 const SLOW_SHARE: i32 = (core::f32::consts::TAU * 10.0 / RATE_HZ as f32 * 32_768.0) as i32;
 
-/// The cell says the same in so many reads in a row when it has stopped, 4.5 ms. Two are usual, since it converts 1000 times a second
-/// and is read 1100 times. With its noise of some 300 LSBs one conversion is equal to the next in one of a thousand: by chance
-/// there are three equal reads every few seconds, and five once in a month.
+/// The cell says the same in so many reads in a row when it has stopped, 4.5 ms. Two are usual, since it converts 1000
+/// times a second and is read 1100 times. With its noise of some 300 LSBs one conversion is equal to the next in one of
+/// a thousand: by chance there are three equal reads every few seconds, and five once in a month.
 const MOST_SAME: u8 = 5;
 
-/// The finger as a [`PressureSensor`], and what it remembers.
+/// The finger as a [`PressureSensor`], with its state.
 #[derive(Clone, Debug)]
 pub struct Mems {
     /// Z in the last slots, the latest last, LSB; how many of them came.
@@ -47,12 +51,12 @@ pub struct Mems {
     /// The last conversion of the cell, and how often in a row it was read.
     cell: Option<i32>,
     same: u8,
-    /// Whether the accelerometer was on when it was asked last.
+    /// True if the accelerometer was on when it was asked last.
     on: bool,
 }
 
 impl Mems {
-    /// Nothing was read yet.
+    /// Creates the state before the first read.
     pub const fn new() -> Self {
         Self {
             z: [0; TAPS],
@@ -160,7 +164,8 @@ impl PressureSensor for Mems {
         pac_shows_force: false,
         at_rest: AtRest {
             pac_noise_counts: (0.8, 8.0),
-            // a cell's zero is off by a tenth of its range or less, 105 counts, and the tip on it weighs 10 g at most, 10 counts
+            // a cell's zero is off by a tenth of its range or less, 105 counts, and the tip on it weighs 10 g at most,
+            // 10 counts
             pdc_counts: (850.0, 1150.0),
         },
     };
@@ -214,6 +219,7 @@ impl PressureSensor for Mems {
 }
 
 /// Both parts, one after the other.
+#[allow(clippy::indexing_slicing)] // while compiling
 const START: [StartStep; iis3dwb::START.len() + ads1220::START.len()] = {
     let mut both = [iis3dwb::START[0]; iis3dwb::START.len() + ads1220::START.len()];
     let mut at = 0;
@@ -228,10 +234,10 @@ const START: [StartStep; iis3dwb::START.len() + ads1220::START.len()] = {
     both
 };
 
-/// Why an answer is no sample.
+/// The reasons why an answer is not a sample.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum MemsError {
-    /// Fewer bytes came than were asked for, or nobody drives the line.
+    /// Fewer bytes came than were asked for, or nothing drives the line.
     #[error("no part of the finger answers: check its plug, its power and the data line")]
     Silent,
     /// The filter is not full yet, or the cell was not read yet.

@@ -1,18 +1,19 @@
 //! PixArt PAA5100JE: an optical sensor of motion over a surface, for the speed of a hand. It sits on a bus of its own.
 //!
-//! It looks at the surface from 15 to 35 mm and counts how far that has moved, 228 counts per mm and mm of height. What it cannot
-//! see, a mirror or clear glass, it reports as such.
+//! It looks at the surface from 15 to 35 mm and counts how far that has moved, 228 counts per mm and mm of height. What
+//! it cannot see, a mirror or clear glass, it reports as such.
 //!
-//! SPI mode 3, at most 2 MHz. Registers, identity, waits and the rule for readings that do not count are those of the data sheet as
-//! public drivers have them. What is written after a reset has no public meaning: values and order are those of Pimoroni's
-//! pmw3901-python (161fe3e, class `PAA5100`); RIOT's `drivers/paa5100je` (fb4e183) writes the same list with longer waits, and does not
-//! divide the second number of the trim by 100.
+//! SPI mode 3, at most 2 MHz. Registers, identity, waits and the rule for readings that do not count are those of the
+//! data sheet as public drivers have them. What is written after a reset has no public meaning: values and order are
+//! those of Pimoroni's pmw3901-python (161fe3e, class `PAA5100`); RIOT's `drivers/paa5100je` (fb4e183) writes the same
+//! list with longer waits, and does not divide the second number of the trim by 100.
 
 use embedded_hal::spi::{Operation, SpiDevice};
 
 /// Fastest clock, Hz.
 pub const CLOCK_HZ: u32 = 2_000_000;
-/// Counts of a way of one mm at the 25 mm of Pimoroni's board. A mm of height is 4 % of it: as far as all slides of a table are made with the same probe, that cancels.
+/// Counts of a way of one mm at the 25 mm of Pimoroni's board. A mm of height is 4 % of it: as far as all slides of a
+/// table are made with the same probe, that cancels.
 pub const COUNTS_PER_MM: f32 = 228.0 / 25.0;
 
 /// Bit of an address that is written.
@@ -27,7 +28,7 @@ const INVERSE_IDENTITY: u8 = 0x5F;
 const BANK: u8 = 0x7F;
 /// The identity, and its complement.
 const IS: [u8; 2] = [0x49, 0xB6];
-/// How it is turned on the list's word: reads as written.
+/// The register's value that turns the axes: reads back as written.
 const TURNED: u8 = 0xA0;
 
 /// From the address to the data of a read (tSRAD), ns.
@@ -48,7 +49,7 @@ const AGAIN_MS: u32 = 1_000;
 const LEAST_QUALITY: u8 = 0x19;
 const LONGEST_SHUTTER: u8 = 0x1F;
 
-/// What is written: address and value.
+/// A list of register writes: address and value.
 type Writes = &'static [[u8; 2]];
 
 /// Before the part's own trim is read, between its two looks, and before the second one is written.
@@ -99,10 +100,10 @@ const LIST: [Writes; 3] = [
     &[[0x73, 0x00]],
 ];
 
-/// What it says since it was read last.
+/// The motion since the last reading.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Reading {
-    /// Whether anything has moved.
+    /// True if anything has moved.
     pub any: bool,
     /// Counts along both axes.
     pub counts: [i16; 2],
@@ -124,7 +125,7 @@ impl Reading {
         }
     }
 
-    /// How far it has moved, counts along both axes; `None` where it does not see the surface.
+    /// The distance moved, counts along both axes; `None` where it does not see the surface.
     pub const fn moved(&self) -> Option<[i16; 2]> {
         if self.quality < LEAST_QUALITY && self.shutter == LONGEST_SHUTTER {
             None
@@ -136,7 +137,7 @@ impl Reading {
     }
 }
 
-/// Why it cannot be used.
+/// The reasons why it cannot be used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MotionFault {
     /// The bus or the chip select failed.
@@ -152,7 +153,7 @@ pub enum MotionFault {
     Forgot,
 }
 
-/// What it is at.
+/// The state of the driver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
     /// To be reset.
@@ -172,9 +173,11 @@ pub struct Paa5100je<SPI> {
     state: State,
     /// Nothing is done before this time, ms.
     until_ms: Option<u32>,
-    /// When it saw something move last.
+    /// The time of the last motion.
     moved_ms: u32,
     fault: Option<MotionFault>,
+    /// It has said once who it is.
+    found: bool,
 }
 
 impl<SPI: SpiDevice> Paa5100je<SPI> {
@@ -186,6 +189,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
             until_ms: None,
             moved_ms: 0,
             fault: None,
+            found: false,
         }
     }
 
@@ -194,13 +198,19 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
         &mut self.spi
     }
 
-    /// Why it does not measure; `None` while it starts, and when it does.
+    /// Returns why it does not measure; `None` while it starts, and while it measures.
     pub fn fault(&self) -> Option<MotionFault> {
         self.fault
     }
 
-    /// To be called every 10 ms or so with a clock of ms that may turn over: starts it, waiting between the calls, and reads
-    /// it. Counts along both axes since the last reading; `None` while it does not see the surface or does not work.
+    /// Returns whether there is one: it has said who it is since this was made.
+    pub fn is_found(&self) -> bool {
+        self.found
+    }
+
+    /// To be called every 10 ms or so with a clock of ms that may turn over: starts it, waiting between the calls, and
+    /// reads it. Counts along both axes since the last reading; `None` while it does not see the surface or does not
+    /// work.
     ///
     /// A call takes at most 84 writes and some reads, 2 ms with the fastest clock; one that reads takes 0.1 ms.
     pub fn poll(&mut self, now_ms: u32) -> Option<[i16; 2]> {
@@ -269,17 +279,18 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
         Ok(None)
     }
 
-    /// Whether it is there.
+    /// Checks that the part is there.
     fn identify(&mut self) -> Result<(), MotionFault> {
         let is = [self.read(IDENTITY)?, self.read(INVERSE_IDENTITY)?];
         if is == IS {
+            self.found = true;
             Ok(())
         } else {
             Err(MotionFault::Identity(is))
         }
     }
 
-    /// Whether it is there and set up.
+    /// Checks that the part is there and set up.
     fn check(&mut self) -> Result<(), MotionFault> {
         self.identify()?;
         if self.read(ORIENTATION)? == TURNED {
@@ -349,7 +360,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
     }
 }
 
-/// What is written back of the part's two numbers of trim.
+/// Returns the value to write back for the part's two trim numbers.
 const fn trimmed(first: u8, second: u8) -> (u8, u8) {
     // 14 is added up to 28, and then 11 to what is above 28
     let first = if first <= 28 { first + 14 } else { first };

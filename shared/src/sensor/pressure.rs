@@ -1,5 +1,5 @@
-//! Pressures of the fingertip: what every sensor is reduced to, and the calibration that turns counts into pascals and
-//! newtons.
+//! Pressures of the fingertip, the common form of every sensor's samples, and the calibration that turns counts into
+//! pascals and newtons.
 //!
 //! Words, parity and commands end at [`crate::sensor`]. From here on there are [`Counts`] of two channels and one
 //! [`Calibration`] record for each fingertip.
@@ -53,7 +53,7 @@ impl Counts {
         }
     }
 
-    /// The lower 12 bits of `word`; the upper 4 are not looked at.
+    /// The lower 12 bits of `word`; the upper 4 are ignored.
     pub const fn from_low_bits(word: u16) -> Self {
         Self(word & Self::MAX.0)
     }
@@ -69,7 +69,7 @@ impl Counts {
         self.0
     }
 
-    /// Whether the reading sits at an end of the range: the real voltage may lie beyond it.
+    /// Returns whether the reading sits at an end of the range: the real voltage may lie beyond it.
     pub const fn is_clipped(self) -> bool {
         self.0 == Self::MIN.0 || self.0 == Self::MAX.0
     }
@@ -78,7 +78,7 @@ impl Counts {
 /// One sample of one channel.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Pressure {
-    /// Which of the two pressures.
+    /// The channel: one of the two pressures.
     pub channel: Channel,
     /// The reading.
     pub counts: Counts,
@@ -94,7 +94,7 @@ pub struct Force {
     pub beyond_linear: bool,
 }
 
-/// The constants of one fingertip. All of them differ from device to device; store what was measured on yours.
+/// The constants of one fingertip. All of them differ from device to device; store those measured on yours.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Calibration {
     /// Dynamic pressure of one count, Pa.
@@ -123,8 +123,9 @@ impl Calibration {
     /// A BioTac with the paper's values, and any transducer behind the paper's circuit.
     ///
     /// P_DC has 21.8 mV/kPa, P_AC 2.16 mV/Pa (21.8 mV/kPa times the second gain of 99.1) around 1.65 V (Methods,
-    /// "BioTac"): 36.96 Pa and 0.373 Pa a count. The BioTac SP manual says 36.5 and 0.37. Force: 11.5 mN a count, a line
-    /// below 2 N (fig. 3). The no-contact value is a recorded one, 2583..2695 over time (biotac_sp_ros, output.txt).
+    /// "BioTac"): 36.96 Pa and 0.373 Pa a count. The BioTac SP manual says 36.5 and 0.37. Force: 11.5 mN a count, a
+    /// line below 2 N (fig. 3). The no-contact value is a recorded one, 2583..2695 over time (biotac_sp_ros,
+    /// output.txt).
     pub const PAPER: Self = Self {
         pac_pa_per_count: MV_PER_COUNT / 2.16,
         pac_rest: 2048.0,
@@ -137,9 +138,9 @@ impl Calibration {
     /// Checks a record that comes from storage or from the host before a motor is moved by it.
     ///
     /// # Errors
-    /// The first value that cannot be: a scale that is not above 0, a rest value outside the converter's range, or a
+    /// The first impossible value: a scale that is not above 0, a rest value outside the converter's range, or a
     /// no-contact value that leaves less than the linear range below full scale, so that the finger would press on and
-    /// P_DC never say so.
+    /// P_DC would not show it.
     #[inline(never)]
     pub fn check(&self) -> Result<(), CalibrationError> {
         let scales = [
@@ -163,8 +164,8 @@ impl Calibration {
         Ok(())
     }
 
-    /// Pressure of `counts` on `channel`, Pa: P_AC about its rest value, P_DC above its no-contact value. `counts` may be
-    /// a mean.
+    /// Pressure of `counts` on `channel`, Pa: P_AC about its rest value, P_DC above its no-contact value. `counts` may
+    /// be a mean.
     pub fn pascals(&self, channel: Channel, counts: f32) -> f32 {
         let (rest, pa_per_count) = self.line(channel);
         (counts - rest) * pa_per_count
@@ -214,7 +215,7 @@ impl Calibration {
     }
 }
 
-/// A force was asked for that P_DC cannot tell.
+/// The requested force lies beyond the range that P_DC can measure.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error(
     "contact force {force_mn} mN is beyond {linear_mn} mN, where the skin touches the core: ask for less"
@@ -222,11 +223,11 @@ impl Calibration {
 pub struct BeyondLinear {
     /// The force asked for, mN.
     pub force_mn: u16,
-    /// Where the linear range ends, mN.
+    /// The end of the linear range, mN.
     pub linear_mn: f32,
 }
 
-/// What is wrong with a calibration record.
+/// The faults of a calibration record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum CalibrationError {
     /// A scale, or the end of the linear range, is not a number above 0, or no finger has so many mN per count.

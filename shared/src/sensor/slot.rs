@@ -1,18 +1,18 @@
-//! What is done on the bus in a slot, as plain data: chip selects, bytes and gaps. Who does it has the bus: a driver over
-//! embedded-hal ([`Driver`](crate::sensor::Driver)), the firmware's interrupts, a simulated finger.
+//! The transactions of a slot as plain data: chip selects, bytes and gaps. The owner of the bus carries them out: a
+//! driver over embedded-hal ([`Driver`](crate::sensor::Driver)), the firmware's interrupts, a simulated finger.
 
 use core::ops::RangeInclusive;
 
 use embedded_hal::spi::{Mode, Phase, Polarity};
 
-/// A part of a finger as the bus sees it: what has a chip select of its own.
+/// A part of a finger on the bus: a chip with a chip select of its own.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Port {
-    /// What it is called in messages.
+    /// Its name in messages.
     pub name: &'static str,
     /// Polarity and phase of the clock.
     pub mode: Mode,
-    /// Clocks that the part works with, Hz.
+    /// The allowed clocks of the part, Hz.
     pub clock_hz: RangeInclusive<u32>,
 }
 
@@ -32,7 +32,7 @@ pub struct Transaction {
     pub port: u8,
     /// Bytes to send, at most [`MAX_BYTES`]; as many come in meanwhile.
     pub out: &'static [u8],
-    /// So many of those that come in are the answer: the last ones.
+    /// The number of incoming bytes that are the answer: the last ones.
     pub answer: u8,
     /// Shortest time from here, with chip select high, to the next transaction of this slot or of the next one, us.
     pub gap_us: u32,
@@ -58,7 +58,7 @@ impl Transaction {
         }
     }
 
-    /// Whether the byte at an index belongs to the answer.
+    /// Returns whether the byte at an index belongs to the answer.
     pub const fn answers_at(&self, index: usize) -> bool {
         index + self.answer as usize >= self.out.len()
     }
@@ -73,7 +73,7 @@ impl Transaction {
         bytes
     }
 
-    /// Adds what belongs to the answer of the bytes that came in.
+    /// Adds those of the incoming bytes that belong to the answer.
     pub(super) fn add_to(&self, answer: &mut Answer, came_in: &[u8]) {
         let first = came_in.len().saturating_sub(self.answer.into());
         // there is room for all answers of a slot
@@ -81,22 +81,22 @@ impl Transaction {
     }
 }
 
-/// A step of a finger's start-up list: something to send, what has to come back, and the time until the next step.
+/// A step of a finger's start-up list: a transaction, the expected answer, and the time until the next step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StartStep {
-    /// What is sent.
+    /// The transaction.
     pub transaction: Transaction,
-    /// For each byte of its answer: the bits that matter, and what they have to be.
+    /// For each byte of its answer: a mask of the bits that matter, and their expected values.
     pub expect: &'static [(u8, u8)],
     /// Shortest time to the next step, or to the first slot, beyond the transaction's own gap, us.
     pub wait_us: u32,
 }
 
 impl StartStep {
-    /// Whether the answer is as it must be.
+    /// Checks the answer against the expected bits.
     ///
     /// # Errors
-    /// The first byte that is not, or that did not come.
+    /// The first byte that is wrong or missing.
     pub fn check(&self, ports: &[Port], answer: &[u8]) -> Result<(), Unexpected> {
         for (at, (mask, want)) in self.expect.iter().enumerate() {
             let got = answer.get(at).copied().unwrap_or(0xFF);
@@ -114,10 +114,10 @@ impl StartStep {
     }
 }
 
-/// A part of a finger does not answer as it must before it is used.
+/// A part of a finger gives a wrong answer during start-up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Unexpected {
-    /// Which one.
+    /// The part.
     pub part: &'static str,
     /// The first byte that was sent to it.
     pub sent: u8,
@@ -136,7 +136,7 @@ impl core::fmt::Display for Unexpected {
 }
 
 impl Unexpected {
-    /// What is wrong, and what to check. Put together by hand: on a chip, the machinery of formats is a kilobyte.
+    /// The fault, and the advice what to check. Assembled by hand: on a chip, the formatting machinery is a kilobyte.
     pub fn sentence(&self) -> Text {
         const DIGITS: &str = "0123456789ABCDEF";
         let hex = |byte: u8| {
@@ -171,11 +171,11 @@ impl Unexpected {
     }
 }
 
-/// Does transactions one after the other, and gives their answers. `transact` gets the bytes to send and puts in their place
-/// what came in; the gap after a transaction is its business, too.
+/// Carries out transactions one after the other, and returns their answers. `transact` gets the bytes to send, replaces
+/// them by the incoming ones, and keeps the gap after the transaction.
 ///
 /// # Errors
-/// The first of `transact`; nothing is done after it.
+/// The first error of `transact`; the transactions after it are not carried out.
 pub fn perform<E>(
     transactions: &[Transaction],
     mut transact: impl FnMut(&Transaction, &mut [u8]) -> Result<(), E>,
@@ -190,8 +190,8 @@ pub fn perform<E>(
     Ok(answer)
 }
 
-/// How long transactions and the gaps after them take, us, if a byte takes `byte_ns` and each transaction may end
-/// `slack_us` late: a slot of them has to be as long.
+/// The time of transactions and their gaps, us, if a byte takes `byte_ns` and each transaction may end `slack_us` late:
+/// a slot of them has to be as long.
 pub const fn length_us(transactions: &[Transaction], byte_ns: u32, slack_us: u32) -> u32 {
     let (mut us, mut rest) = (0, transactions);
     while let [transaction, others @ ..] = rest {

@@ -1,8 +1,8 @@
-//! How a finger, and what it touches, changes from one session to the next.
+//! The drift of a finger and its samples from one session to the next.
 //!
-//! Features drift more than the scatter of a session's slides explains. In the raw features it is plain how: neighbouring
-//! bands go together, and whatever is no band goes by itself. The whitened axes are turned so that this covariance is
-//! diagonal there: a table holds its variances, which come on top of those of means everywhere.
+//! Features drift more than the scatter of a session's slides explains. In the raw features it is plain how:
+//! neighbouring bands go together, and whatever is no band goes by itself. The whitened axes are turned so that this
+//! covariance is diagonal there: a table holds its variances, which come on top of those of means everywhere.
 //!
 //! The two numbers were chosen on twenty materials of one rig.
 
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use super::matrix::Square;
 use crate::features::{FEATURE_STEPS, FeatureSet, MAX_FEATURES};
 
-/// Variances of the drift along the axes of a whitening, of each two their mean: those next to each other are much alike, for
-/// axes are in the order of their variances. 0 beyond the features.
+/// Variances of the drift along the axes of a whitening, of each two their mean: those next to each other are much
+/// alike, for axes are in the order of their variances. 0 beyond the features.
 pub type Drifts = [f32; PAIRS];
 /// Pairs of axes; the last has one where the features are an odd number.
 pub const PAIRS: usize = MAX_FEATURES / 2;
 
-/// How much is expected.
+/// The amount of drift that is expected.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Drift {
     /// Standard deviation of the logarithm of a band's power.
@@ -27,7 +27,7 @@ pub struct Drift {
 }
 
 impl Default for Drift {
-    /// What was seen between the begin and the end of a session: 0.4 dB, and 4 %.
+    /// The drift between the begin and the end of a recorded session: 0.4 dB, and 4 %.
     fn default() -> Self {
         Self {
             bands: 0.1,
@@ -43,12 +43,12 @@ impl Drift {
         traction: 0.0,
     };
 
-    /// Whether none is expected.
+    /// Returns whether no drift is expected.
     pub fn is_none(self) -> bool {
         self == Self::NONE
     }
 
-    /// Whether these can be a drift: neither negative nor more than anything could be learned with.
+    /// Returns whether these values are a possible drift: not negative, and small enough to learn with.
     pub fn is_possible(self) -> bool {
         let possible = |sd: f32| (0.0..=10.0).contains(&sd);
         possible(self.bands) && possible(self.traction)

@@ -5,8 +5,8 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
-    PACED, PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
+    PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
 use super::sections::Sections;
@@ -22,11 +22,11 @@ use crate::features::{FeatureSet, Movement, Property, PropertySet};
 pub struct Texture<'a> {
     /// Its name, unlike every other, of 1 to 255 bytes.
     pub name: &'a str,
-    /// What was learned, movement by movement.
+    /// The training statistics, movement by movement.
     pub experience: &'a [Experience],
 }
 
-/// What was learned of a texture, movement by movement, as its table keeps it.
+/// The training statistics of a texture, movement by movement, as its table keeps them.
 #[derive(Clone, Copy, Debug)]
 pub enum Known<'a> {
     /// For a table of Gaussians.
@@ -35,14 +35,14 @@ pub enum Known<'a> {
     Fused(&'a [Whitened]),
 }
 
-/// What is to be different in a table.
+/// A change of a table.
 #[derive(Clone, Copy, Debug)]
 pub enum Change<'a> {
     /// Puts a texture in: it replaces the one of that name, or is added.
     Put {
         /// Its name.
         name: &'a str,
-        /// What was learned of it.
+        /// Its training statistics.
         known: Known<'a>,
         /// From whom.
         tally: Tally,
@@ -58,12 +58,12 @@ pub enum Change<'a> {
     Forget(u16),
 }
 
-/// Why a table was not written.
+/// The reasons why a table was not written.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub enum EncodeError {
     /// No texture, movement or property, or more movements than [`MAX_MOVEMENTS`].
     Empty,
-    /// What was learned is of another kind than the table, or of other features.
+    /// The statistics are of another kind than the table, or of other features.
     Contents,
     /// There is no texture with this index.
     Texture(u16),
@@ -82,7 +82,7 @@ pub enum EncodeError {
         /// The mean.
         mean: f32,
     },
-    /// What was written does not read: a name is empty or there twice, or a movement is.
+    /// The written table is invalid: a name is empty or there twice, or a movement is.
     Invalid(TableError),
 }
 
@@ -171,8 +171,8 @@ pub fn encode<'o, 'a>(
     write(out, contents, movements, |_| (), 0, rows, (0, |_| ()))
 }
 
-/// Writes a fused table into `out` and reads it back: every movement with its whitening, every texture with its name and
-/// what was learned of it, movement by movement.
+/// Writes a fused table into `out` and reads it back: every movement with its whitening, every texture with its name
+/// and what was learned of it, movement by movement.
 ///
 /// # Errors
 /// Parts of `out` may have been written then.
@@ -254,8 +254,8 @@ fn rewrite<'o, 'a>(
     )
 }
 
-/// Writes `old` into `out` with one change. All other textures stay the same to the bit; what a table knows of shorter slides is left
-/// out, unless a texture gets another name: every one that is there must be known of them.
+/// Writes `old` into `out` with one change. All other textures stay the same to the bit; what a table knows of shorter
+/// slides is left out, unless a texture gets another name: every one that is there must be known of them.
 ///
 /// # Errors
 /// As [`encode`], and [`EncodeError::Texture`].
@@ -300,11 +300,6 @@ pub fn amend<'o>(
     let rows = kept.chain(added);
     if old.is_paced() {
         return rewrite_paced(out, old, rows);
-    }
-    if !EARLY {
-        let sections = old.sections;
-        let write = |writer: &mut Writer<'_>| writer.put(sections);
-        return rewrite(out, old, old.lineage(), rows, (sections.len(), write));
     }
     // what shorter slides say is of these textures and no others
     let same = matches!(change, Change::Rename { .. });
@@ -354,7 +349,7 @@ fn rewrite_paced<'o, 'a>(
     rewrite(out, old, old.lineage(), rows, (of_sections, write))
 }
 
-/// Where the cells of a texture come from.
+/// The source of the cells of a texture.
 #[derive(Clone, Copy)]
 enum Cells<'a> {
     Old(Table<'a>, u16),
@@ -398,7 +393,7 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// Whether it has something at every movement.
+    /// Returns whether it has statistics at every movement.
     fn fits(&self, contents: Contents, movements: usize) -> Result<bool, EncodeError> {
         match (self.cells, contents) {
             (Cells::Old(..), _) => Ok(true),
@@ -554,9 +549,9 @@ fn write<'o, 'a>(
     sections(&mut writer);
     let written = writer.buffer.get(names_end..writer.at).unwrap_or_default();
     let has = |wanted| each(written).flatten().any(|(kind, _)| kind == wanted);
-    let newer = if PACED && has(SLOPES) {
+    let newer = if has(SLOPES) {
         Some(PACED_VERSION)
-    } else if EARLY && has(LENGTH) {
+    } else if has(LENGTH) {
         Some(EARLY_VERSION)
     } else {
         None

@@ -16,8 +16,6 @@ pub const VERSION: u16 = 4;
 pub(super) const PACED_VERSION: u16 = 5;
 /// Version of those without sections, which is the same otherwise.
 pub(super) const PLAIN_VERSION: u16 = 3;
-/// Whether this build knows speeds. A probe without a sensor of speed saves the space, and refuses such tables.
-pub const PACED: bool = cfg!(any(test, feature = "pace"));
 /// The kind of the section that has them.
 pub(super) const SLOPES: u16 = 4;
 /// Version of those that know what slides say before their end, which is the same otherwise.
@@ -29,8 +27,6 @@ pub(super) const DRIFT: u16 = 1;
 pub(super) const TWO: usize = 8;
 /// Bytes of a length of shorter slides in its section.
 pub(super) const MS: usize = 2;
-/// Whether this build can end a slide early. A probe that cannot saves the space, and refuses such tables.
-pub const EARLY: bool = cfg!(any(test, feature = "early"));
 /// The kind of the sections that say it, one for each length.
 pub(super) const LENGTH: u16 = 6;
 pub(super) const GAUSSIANS: u8 = 0;
@@ -51,8 +47,8 @@ pub const MAX_TEXTURES: usize = 128;
 /// Name of a texture.
 pub type Name = String<40>;
 
-/// What an exploration does next: makes one of the table's movements and looks at one property of it, or at all that the
-/// slide says.
+/// The next action of an exploration: one of the table's movements, and the property to look at, or all features of the
+/// slide.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub struct Action {
     /// Index of the movement in the table.
@@ -79,7 +75,7 @@ impl Action {
     }
 }
 
-/// What a table knows of a texture.
+/// The kind of data that a table holds of a texture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Contents {
     /// A Gaussian per (movement, property), of these properties.
@@ -99,7 +95,7 @@ pub struct Tally {
     pub itself: u8,
 }
 
-/// Why bytes are no texture table.
+/// The reasons why bytes are not a valid texture table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum TableError {
     /// Fewer bytes than the table needs.
@@ -117,9 +113,9 @@ pub enum TableError {
     Method(u8),
     /// The length in the header does not fit what it holds.
     Length {
-        /// What the header says.
+        /// The length in the header.
         header: usize,
-        /// What the contents take.
+        /// The length of the contents.
         contents: usize,
     },
     /// The checksum differs: the bytes have changed since they were written.
@@ -148,7 +144,7 @@ pub enum TableError {
     Name(u16),
     /// A texture has the number of another one.
     Number(u16),
-    /// What follows the names is no row of sections.
+    /// The bytes after the names are not valid sections.
     Sections,
     /// A section of this kind is damaged, there twice, or not for such a table.
     Section(u16),
@@ -172,14 +168,9 @@ impl fmt::Display for TableError {
                 "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
             ),
             Self::Version(found) => {
-                let newest = match (EARLY, PACED) {
-                    (true, _) => EARLY_VERSION,
-                    (_, true) => PACED_VERSION,
-                    _ => VERSION,
-                };
                 write!(
                     f,
-                    "version {found}, and this program reads versions {PLAIN_VERSION} to {newest}: learn the table anew"
+                    "version {found}, and this program reads versions {PLAIN_VERSION} to {EARLY_VERSION}: learn the table anew"
                 )
             }
             Self::Method(found) => write!(f, "method {found} is unknown to this program"),
@@ -217,8 +208,8 @@ impl fmt::Display for TableError {
             ),
             Self::Section(1) => f.write_str("the drift that it expects is damaged"),
             Self::Section(2) => f.write_str("its limits of new and changed textures are damaged"),
-            Self::Section(4) if PACED => f.write_str("its slopes over speed are damaged"),
-            Self::Section(6) if EARLY => f.write_str("what it says of shorter slides is damaged"),
+            Self::Section(4) => f.write_str("its slopes over speed are damaged"),
+            Self::Section(6) => f.write_str("what it says of shorter slides is damaged"),
             Self::Section(kind) => write!(f, "section {kind} is damaged"),
             Self::Number(texture) => {
                 write!(f, "texture {} has another's number", texture + 1)
@@ -239,7 +230,7 @@ impl core::error::Error for TableError {}
 /// Bytes of a texture's number and tally.
 pub(super) const LABEL_BYTES: usize = 5;
 
-/// Where the parts of a table begin.
+/// The offsets of the parts of a table.
 pub(super) struct Layout {
     pub(super) whitenings: usize,
     pub(super) cells: usize,

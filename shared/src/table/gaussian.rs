@@ -16,8 +16,8 @@ pub const fn mean_step(property: Property) -> f32 {
     }
 }
 
-/// What one property of a texture is expected to be (eq. 4). The order of the fields is fixed, for kernels that are
-/// not written in Rust.
+/// The expected distribution of one property of a texture (eq. 4). The order of the fields is fixed, for kernels that
+/// are not written in Rust.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[repr(C)]
 pub struct Gaussian {
@@ -27,7 +27,7 @@ pub struct Gaussian {
     pub sd: f32,
 }
 
-/// What one action is expected to feel like, texture by texture.
+/// The expected distributions of one action, texture by texture.
 #[derive(Clone, Copy, Debug)]
 pub struct Gaussians<'t> {
     /// Each begins `stride` bytes after the one before.
@@ -72,8 +72,8 @@ impl<'t> Gaussians<'t> {
         self.step
     }
 
-    /// What makes steps of the means by steps of the standard deviation numbers whose square is half of that of standard
-    /// deviations, in Q16.
+    /// The factor from (steps of the means / steps of the standard deviation) to numbers whose square is half of that
+    /// of standard deviations, in Q16.
     pub fn scale(&self) -> f32 {
         /// Square root of 2^16 / 2.
         const HALF_Q16: f32 = 181.019_34;

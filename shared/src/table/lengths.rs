@@ -1,8 +1,9 @@
-//! What the first part of a slide says: an own table for each of a few lengths.
+//! The tables for the first part of a slide: one for each of a few lengths.
 //!
-//! The beginning of a slide is not like its whole, and short windows scatter more: a slide that is to end early is compared with
-//! the first parts of the slides that were learned from. In a table of M movements those of the n-th length of movement m are the
-//! movement n M + m of whoever asks for cells, trials, drift or population; the whole slides are length 0.
+//! The beginning of a slide is not like its whole, and short windows scatter more: a slide that is to end early is
+//! compared with the first parts of the slides that were learned from. In a table of M movements those of the n-th
+//! length of movement m are the movement n M + m of whoever asks for cells, trials, drift or population; the whole
+//! slides are length 0.
 //!
 //! Section of kind 6, one for each length, the shortest first:
 //!
@@ -13,9 +14,7 @@
 //! | | contents of section 1, and of section 2, where the table has them |
 
 use super::encode::{EncodeError, rewrite_with};
-use super::format::{
-    CRC_BYTES, DRIFT, EARLY, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, SLOPES, TWO, array, each,
-};
+use super::format::{CRC_BYTES, DRIFT, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, TWO, array, each};
 use super::limits::Limits;
 use super::sections::{NOVELTY, are_drifts, are_limits, of_drift, of_population};
 use super::view::Table;
@@ -23,10 +22,10 @@ use super::view::Table;
 /// Most lengths of a table.
 pub const MAX_LENGTHS: usize = 6;
 const _: () = assert!((MAX_LENGTHS + 1) * MAX_MOVEMENTS <= u8::MAX as usize);
-/// Where the header has the number of textures.
+/// The offset of the number of textures in the header.
 const COUNT: usize = 12;
 
-/// What slides of one length say, for [`with_lengths`].
+/// The table of slides of one length, for [`with_lengths`].
 #[derive(Clone, Copy, Debug)]
 pub struct Shorter<'t> {
     /// Their length in ms at constant speed.
@@ -117,17 +116,17 @@ impl<'a> Table<'a> {
         self.lengths().map(|length| length.ms)
     }
 
-    /// What stands for a movement of which the slide has had the `n`th length, from 1; `None` if there is no such length.
-    #[cfg(any(test, feature = "early"))]
+    /// The number that stands for a movement whose slide has had the `n`th length, from 1; `None` if there is no such
+    /// length.
     pub(crate) fn at_length(&self, movement: u8, n: u8) -> Option<u8> {
         let at = n.checked_mul(self.movements)?.checked_add(movement)?;
         let known = movement < self.movements && self.shorter(at).is_some();
         known.then_some(at)
     }
 
-    /// Whether this is a movement's own number, not that of a shorter slide of it.
+    /// Returns whether this is a movement's own number, not that of a shorter slide of it.
     pub(crate) fn is_whole(&self, movement: u8) -> bool {
-        !EARLY || movement < self.movements
+        movement < self.movements
     }
 
     /// As [`Table::limits`], of slides of the length that a movement stands for.
@@ -138,7 +137,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// How many lengths it has; `None` where one is not what its section says, or not longer than the one before.
+    /// The number of lengths; `None` where one contradicts its section, or is not longer than the one before.
     pub(super) fn count_lengths(&self) -> Option<usize> {
         let (features, movements) = (self.features(), usize::from(self.movements));
         let drift = self
@@ -177,10 +176,10 @@ impl<'a> Table<'a> {
         (count <= MAX_LENGTHS).then_some(count)
     }
 
-    /// Where the trials of each length begin among the bytes of the table.
+    /// The offsets of the trials of each length among the bytes of the table.
     pub(super) fn trials_of_lengths(&self) -> impl Iterator<Item = usize> + use<'a> {
         let trials = self.layout().trials;
-        let sections = if EARLY { self.sections } else { &[] };
+        let sections = self.sections;
         let mut at = self.bytes.len() - CRC_BYTES - self.sections.len();
         each(sections)
             .flatten()
@@ -189,10 +188,5 @@ impl<'a> Table<'a> {
                 at = begin + contents.len();
                 (kind == LENGTH).then_some(begin + MS + trials)
             })
-    }
-
-    /// Whether it has the section of speeds, whether or not this build knows them.
-    pub(super) fn has_slopes(&self) -> bool {
-        self.section(SLOPES).is_some()
     }
 }

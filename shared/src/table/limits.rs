@@ -1,5 +1,5 @@
-//! From which score on a texture is new, or no longer as it was learned: the tail of the scores that a table's own slides
-//! have, kept so that the share of false alarms can be chosen later.
+//! From which score on a texture is new, or no longer as it was learned: the tail of the scores that a table's own
+//! slides have, kept so that the share of false alarms can be chosen later.
 
 use crate::features::MAX_FEATURES;
 
@@ -9,13 +9,13 @@ pub const EPISODES: usize = 3;
 pub(super) const MOST_VARIANCE: f32 = 262_144.0;
 /// Share of scores above the beginning of the tail.
 const TAIL: f32 = 0.1;
-/// False alarms that come for each that the tail promises: drawn slides are more alike than those of another day. Twice as
-/// many came on slides kept aside, of one rig, whatever the promise.
+/// False alarms that come for each that the tail promises: drawn slides are more alike than those of another day. Twice
+/// as many came on slides kept aside, of one rig, whatever the promise.
 const REAL: f32 = 2.0;
 /// Share of false alarms that people are content with, unless they say otherwise.
 pub const FALSE_ALARM: f32 = 0.02;
 
-/// Whether people can be content with this share: a limit for less would be a guess, and for more none is needed.
+/// Returns whether this share is allowed: a limit for less would be a guess, and for more none is needed.
 pub fn is_false_alarm(share: f32) -> bool {
     (0.0005..=0.2).contains(&share)
 }
@@ -23,13 +23,13 @@ pub fn is_false_alarm(share: f32) -> bool {
 /// The upper tail of the scores of known textures, which falls exponentially.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Tail {
-    /// Where it begins.
+    /// The begin of the tail.
     pub begin: f32,
     /// Mean excess over that.
     pub excess: f32,
 }
 
-/// What a score is compared with: that of an expected drift, or that of none.
+/// The limit for a score: with an expected drift, or without.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Against {
     /// Over this limit, a texture is new.
@@ -77,7 +77,7 @@ impl Limits {
         numbers.map(f32::to_le_bytes)
     }
 
-    /// Whether these can be limits: finite, as scores are, for a share that people can be content with.
+    /// Returns whether these are possible limits: finite, as scores are, for an allowed share.
     pub(super) fn are_possible(&self) -> bool {
         // scores are below 1e4: logarithms of likelihoods of a few slides
         let fits = |t: Tail| t.begin.abs() < 1e4 && t.excess > 0.0 && t.excess < 1e4;
@@ -116,7 +116,7 @@ impl<'b> Numbers<'b> {
         Self(bytes.as_chunks().0)
     }
 
-    /// Whether all are variances that sums and products of [`MAX_FEATURES`] of them may have.
+    /// Returns whether all are variances of which sums and products of [`MAX_FEATURES`] stay finite.
     pub(super) fn are_variances(self, least: f32) -> bool {
         const { assert!(MAX_FEATURES <= 14) };
         self.0.len() <= MAX_FEATURES

@@ -66,8 +66,8 @@ pub(super) fn product(left: &Square, right: &Square) -> Square {
     })
 }
 
-/// The eigenvectors of a symmetric matrix as rows, that of the largest eigenvalue first (Jacobi's rotations; Golub and Van
-/// Loan, Matrix Computations, 8.5). Of the two directions of each, that in which its largest element is positive.
+/// The eigenvectors of a symmetric matrix as rows, that of the largest eigenvalue first (Jacobi's rotations; Golub and
+/// Van Loan, Matrix Computations, 8.5). Of the two directions of each, that in which its largest element is positive.
 pub(super) fn principal_axes(matrix: &Square, features: usize) -> Square {
     let features = features.min(MAX_FEATURES);
     let mut rest = *matrix;

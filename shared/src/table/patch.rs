@@ -12,8 +12,8 @@ use super::whitening::Whitening;
 use crate::CRC32;
 use crate::features::Property;
 
-/// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made from
-/// the one that it was.
+/// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made
+/// from the one that it was.
 ///
 /// # Errors
 /// The bytes are no fused table, or have no such texture or movement.
@@ -59,7 +59,7 @@ pub fn retell(
 }
 
 impl Table<'_> {
-    /// What was learned of a texture at a movement, to go on from; what is in the table is rounded.
+    /// The statistics of a texture at a movement, to go on from; the table holds them rounded.
     pub fn experience(&self, texture: u16, movement: u8) -> Experience {
         let trials = self.trials(texture, movement);
         if trials == 0 {
@@ -82,9 +82,9 @@ impl Table<'_> {
     }
 }
 
-/// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place among the
-/// whitened, and slides that differ from those of before by as much are whitened as those were. Of shorter slides nothing is known
-/// of that movement then.
+/// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place
+/// among the whitened, and slides that differ from those of before by as much are whitened as those were. Of shorter
+/// slides nothing is known of that movement then.
 ///
 /// # Errors
 /// The bytes are no fused table of so many features, or have no such movement.

@@ -1,4 +1,4 @@
-//! What textures are like at a movement, whether or not a table has them: the covariance of the means that it has.
+//! The population of textures at a movement, known or not: the covariance of the means that a table has.
 
 use super::limits::MOST_VARIANCE;
 use super::matrix::{Square, principal_axes, variances};
@@ -21,8 +21,8 @@ pub struct Population {
 }
 
 impl Population {
-    /// From the whitened means of textures, of so many features, and the number of slides of each; `None` where they are
-    /// fewer than [`POPULATION`].
+    /// From the whitened means of textures, of so many features, and the number of slides of each; `None` where they
+    /// are fewer than [`POPULATION`].
     pub fn new<'m>(
         features: usize,
         means: impl Iterator<Item = (u8, &'m [i16])> + Clone,

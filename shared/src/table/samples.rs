@@ -1,7 +1,7 @@
-//! Whether samples were moved or turned between the trials that a table was learned from, for people to read.
+//! Notes for people: were samples moved or turned between the trials that a table was learned from?
 //!
-//! A slide on the same track again says little about a texture. Nothing is decided by this: a probe carries the section over
-//! as it is when it learns or deletes textures, and does not look into it.
+//! A slide on the same track again says little about a texture. Nothing is decided by this: a probe carries the section
+//! over as it is when it learns or deletes textures, and does not look into it.
 //!
 //! Section of kind 3, 5 bytes for each texture of which it is known:
 //!
@@ -25,15 +25,15 @@ const STAYED: u8 = 1;
 /// Moved or turned between trials.
 const MOVED: u8 = 2;
 
-/// What tells a texture's name from another.
+/// The bytes that distinguish a texture's name from another.
 fn of_name(name: &str) -> [u8; 2] {
     let [low, high, ..] = CRC32.checksum(name.as_bytes()).to_le_bytes();
     [low, high]
 }
 
 impl Table<'_> {
-    /// Whether a texture's sample was moved or turned between trials; `None` where nobody said, and of one that has got
-    /// another name since.
+    /// Returns whether a texture's sample was moved or turned between trials; `None` where it was not noted, and for
+    /// one that has got another name since.
     pub fn moved(&self, texture: u16) -> Option<bool> {
         let key = self.sample_key(texture)?;
         let (entries, _) = self.section(SAMPLES)?.as_chunks::<ENTRY>();
@@ -70,8 +70,8 @@ pub const fn samples_length(textures: usize) -> usize {
     4 + ENTRY * textures
 }
 
-/// Writes `old` into `out`, with whether the sample of each texture was moved in place of what it says of that; all else stays
-/// as it is, and so does the table where nothing is known of any.
+/// Writes `old` into `out`, with whether the sample of each texture was moved in place of what it says of that; all
+/// else stays as it is, and so does the table where nothing is known of any.
 ///
 /// # Errors
 /// As [`super::encode`].

@@ -1,4 +1,4 @@
-//! How slides and textures scatter, and the whitening that follows from it.
+//! The scatter of slides and textures, and the whitening that follows from it.
 
 use heapless::Vec;
 
@@ -11,12 +11,13 @@ use super::matrix::{
 use super::whitening::Whitening;
 use crate::features::{FEATURE_STEPS, FeatureSet, MAX_FEATURES, Vector};
 
-/// Weight of the average over all movements, in trials: with few trials of its own a movement's covariance is mostly that.
+/// Weight of the average over all movements, in trials: with few trials of its own a movement's covariance is mostly
+/// that.
 const SHARED_TRIALS: f64 = 15.0;
 /// Variance of what rounding to whole steps adds, in steps^2: no feature is more certain than that.
 const ROUNDING: f64 = 1.0 / 12.0;
 
-/// Why a whitening cannot be learned.
+/// The reasons why a whitening cannot be learned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum WhitenError {
     /// No texture has two slides of this movement.
@@ -30,7 +31,7 @@ pub enum WhitenError {
     Movements,
 }
 
-/// How the slides of each texture differ at one movement, all textures taken together, and how textures differ.
+/// The scatter of slides within textures at one movement, all textures taken together, and the scatter of textures.
 #[derive(Clone, Debug)]
 pub struct Scatter {
     features: usize,
@@ -220,8 +221,8 @@ pub fn whiten_drifting(
     Ok(whitenings)
 }
 
-/// Weight of a sphere beside a covariance of `d` features from `n` degrees of freedom, by its trace and that of its square
-/// (OAS, Chen et al. 2010, eq. 23).
+/// Weight of a sphere beside a covariance of `d` features from `n` degrees of freedom, by its trace and that of its
+/// square (OAS, Chen et al. 2010, eq. 23).
 pub(crate) fn oas(trace: f64, of_square: f64, d: f64, n: f64) -> f64 {
     let above = (1.0 - 2.0 / d) * of_square + trace * trace;
     let below = (n + 1.0 - 2.0 / d) * (of_square - trace * trace / d);

@@ -1,4 +1,4 @@
-//! What a table may have behind its names, each with its kind and length: who does not know a kind skips it.
+//! The sections that a table may have behind its names, each with its kind and length: a reader skips unknown kinds.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -6,18 +6,16 @@
 //! | 2 | length n |
 //! | n | contents |
 //!
-//! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement variances along each two axes
-//! of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six tails; per
-//! movement the axes of the population as a whitening, and d variances along them. Kind 3 is for people: [`super::samples`].
-//! Kind 4, how means go with the speed: [`super::slopes`].
-//! Kind 5, the finger that it was learned with: [`super::finger`]. Kind 6, what shorter slides say: [`super::lengths`].
+//! Numbers are f32. Kind 1, how it drifts: [`Drift::bands`], [`Drift::traction`]; per movement variances along each two
+//! axes of its whitening. Kind 2, what textures are like, and the limits of scores: [`Limits`], begin and excess of six
+//! tails; per movement the axes of the population as a whitening, and d variances along them. Kind 3 is for people:
+//! [`super::samples`]. Kind 4, how means go with the speed: [`super::slopes`]. Kind 5, the finger that it was learned
+//! with: [`super::finger`]. Kind 6, what shorter slides say: [`super::lengths`].
 
 use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
-use super::format::{
-    DRIFT, EARLY, HEAD, LENGTH, MAX_MOVEMENTS, PACED, SLOPES, TWO, TableError, array, each,
-};
+use super::format::{DRIFT, HEAD, LENGTH, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
@@ -29,14 +27,14 @@ pub(super) const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
 pub(super) const FINGER: u16 = 5;
 
-/// What a fused table is made with beside textures.
+/// The parts of a fused table beside textures.
 #[derive(Clone, Copy, Debug)]
 pub struct Sections<'a> {
-    /// How it drifts, and the variances of every movement.
+    /// The expected drift, and its variances at every movement.
     pub drift: (Drift, &'a [Drifts]),
     /// The limits, and the population of every movement; `None` for a table of too few textures.
     pub novelty: Option<(Limits, &'a [Population])>,
-    /// How means go with the speed; `None` for a table that knows no speeds.
+    /// The slopes of the means over the speed; `None` for a table that knows no speeds.
     pub slopes: Option<Slopes<'a>>,
 }
 
@@ -126,7 +124,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// How much drift the table was made for; `None` for one that does not say, of an older version.
+    /// The drift that the table was made for; `None` for one that does not say, of an older version.
     pub fn drift(&self) -> Option<Drift> {
         let section = self.section(DRIFT)?;
         Some(Drift {
@@ -151,7 +149,7 @@ impl<'a> Table<'a> {
         Limits::read(self.novelty.get(..Limits::BYTES)?)
     }
 
-    /// What textures are like at a movement, in a table that is calibrated.
+    /// The population of textures at a movement, in a table that is calibrated.
     pub(crate) fn population(&self, movement: u8) -> Option<PopulationView<'a>> {
         let population = self.population_bytes(movement)?;
         let (_, variances) = population.split_at_checked(Whitening::bytes(self.features()))?;
@@ -196,9 +194,7 @@ impl<'a> Table<'a> {
         let section = self.section(DRIFT).filter(|_| drifts);
         self.drifts = section.and_then(|s| s.get(TWO..)).unwrap_or_default();
         self.novelty = self.section(NOVELTY).unwrap_or_default();
-        if PACED {
-            self.slopes = self.section(SLOPES).unwrap_or_default();
-        }
+        self.slopes = self.section(SLOPES).unwrap_or_default();
     }
 
     /// That the sections are sections, and those that are known what they say.
@@ -213,10 +209,8 @@ impl<'a> Table<'a> {
                         && self.drift().is_some_and(Drift::is_possible)
                 }
                 NOVELTY => are_limits(contents, features, movements),
-                LENGTH if EARLY => continue,
-                SLOPES if PACED => {
-                    slopes::are_slopes(contents, features, self.textures.into(), movements)
-                }
+                LENGTH => continue,
+                SLOPES => slopes::are_slopes(contents, features, self.textures.into(), movements),
                 _ => continue,
             };
             let first = seen.get_mut(match kind {
@@ -233,7 +227,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Whether the contents of a section of drift have its variances.
+/// Returns whether the contents of a section of drift have its variances.
 #[inline(always)]
 pub(super) fn are_drifts(contents: &[u8], features: usize, movements: usize) -> bool {
     let rest = contents.get(TWO..).unwrap_or_default();
@@ -242,7 +236,7 @@ pub(super) fn are_drifts(contents: &[u8], features: usize, movements: usize) -> 
         && variances.all(|v| Numbers::new(v).are_variances(0.0))
 }
 
-/// Whether these are the contents of a section of limits and population.
+/// Returns whether these are the contents of a section of limits and population.
 #[inline(always)]
 pub(super) fn are_limits(contents: &[u8], features: usize, movements: usize) -> bool {
     let (limits, populations) = contents.split_at_checked(Limits::BYTES).unwrap_or_default();

@@ -1,13 +1,13 @@
-//! How the whitened mean of a texture goes with the speed of a slide: a straight line over ln(speed), of its own.
+//! The slopes of the whitened means: each texture has a straight line over ln(speed) of the slide.
 //!
-//! A rig holds its speed, a hand does not. Where the speed was measured while a table was learned, its means are those at the
-//! movement's speed, and slides scatter about the line; so a slide of unknown speed lies somewhere on it.
+//! A rig holds its speed, a hand does not. Where the speed was measured while a table was learned, its means are those
+//! at the movement's speed, and slides scatter about the line; so a slide of unknown speed lies somewhere on it.
 //!
 //! Section of kind 4, per movement: the speed that is expected where none was measured, [`Pace::mean`] (i16) and
-//! [`Pace::variance`] (f32), the slope of all textures together (d numbers, i16); then per texture and movement its slope (d
-//! numbers, i16).
+//! [`Pace::variance`] (f32), the slope of all textures together (d numbers, i16); then per texture and movement its
+//! slope (d numbers, i16).
 
-use super::format::{PACED, array};
+use super::format::array;
 use super::view::Table;
 use super::whitening::{Column, Slope};
 use crate::features::{FEATURE_STEPS, Observation, Vector};
@@ -28,7 +28,7 @@ pub struct Pace {
     pub pooled: Slope,
 }
 
-/// What a table says of speeds.
+/// The speeds and slopes of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes<'a> {
     /// Of every movement.
@@ -76,7 +76,7 @@ pub(super) fn put_slope(slope: &Slope, features: usize, mut put: impl FnMut(&[u8
     }
 }
 
-/// Whether these are what a section of kind 4 has.
+/// Returns whether these are valid contents of a section of kind 4.
 pub(super) fn are_slopes(bytes: &[u8], features: usize, textures: usize, movements: usize) -> bool {
     let possible = |movement: usize| {
         let at = movement * of_pace(features) + 2;
@@ -87,12 +87,12 @@ pub(super) fn are_slopes(bytes: &[u8], features: usize, textures: usize, movemen
 }
 
 impl<'a> Table<'a> {
-    /// Whether its means go with the speed.
+    /// Returns whether its means depend on the speed.
     pub fn is_paced(&self) -> bool {
-        PACED && !self.slopes.is_empty()
+        !self.slopes.is_empty()
     }
 
-    /// What is the same for all textures, in the section.
+    /// The part of the section that all textures share.
     pub(super) fn paces_bytes(&self) -> &'a [u8] {
         let length = usize::from(self.movements) * of_pace(self.features());
         self.slopes.get(..length).unwrap_or_default()
@@ -131,7 +131,7 @@ impl<'a> Table<'a> {
         slope
     }
 
-    /// What is known of speeds at a movement; `None` in a table that knows none.
+    /// The speeds and slopes at a movement; `None` in a table without speeds.
     pub(crate) fn slopes_at(&self, movement: u8) -> Option<SlopesView<'a>> {
         if !self.is_paced() || movement >= self.movements {
             return None;
@@ -150,14 +150,15 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// ln(speed) of a slide of a movement, 1/1024: the usual one where it is not known, and 0 in a table that knows no speeds.
+    /// ln(speed) of a slide of a movement, 1/1024: the usual one where it is not known, and 0 in a table that knows no
+    /// speeds.
     pub fn pace_of(&self, movement: u8, slide: &Observation) -> i16 {
         let usual = self.slopes_at(movement);
         usual.map_or(0, |slopes| slide.pace.unwrap_or(slopes.mean))
     }
 
-    /// What whitened slides of this mean, of which the mean of ln(speed) is `pace` (1/1024), would have been at the movement's
-    /// speed, if they are of this texture.
+    /// Moves the mean of whitened slides, whose mean of ln(speed) is `pace` (1/1024), to the movement's speed, if they
+    /// are of this texture.
     pub fn at_movement_speed(
         &self,
         texture: Option<u16>,

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::gaussian::Gaussian;
 use crate::features::{MAX_FEATURES, Properties, Property, PropertySet};
 
-/// What was learned of one texture at one movement: number of trials, running mean and sum of squared deviations of each
-/// property (Welford).
+/// The training statistics of one texture at one movement: number of trials, running mean and sum of squared deviations
+/// of each property (Welford).
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Experience {
     pub(super) trials: u8,
@@ -64,7 +64,7 @@ impl Experience {
     }
 }
 
-/// What a table knows of a texture at one movement: the mean of its whitened slides, and how many they were.
+/// The data of a texture at one movement: the mean of its whitened slides, and their number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Whitened {
     /// Slides, 255 for more.
@@ -74,9 +74,9 @@ pub struct Whitened {
 }
 
 impl Whitened {
-    /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8 of
-    /// the recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is lost; 3
-    /// was chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
+    /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8
+    /// of the recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is
+    /// lost; 3 was chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
     pub const MEMORY: u8 = 3;
 
     /// Takes in a whitened slide of a training: all have the same weight.
@@ -103,7 +103,7 @@ impl Whitened {
     }
 }
 
-/// What was learned of a texture at one movement, as the table that it is for keeps it.
+/// The training statistics of a texture at one movement, in the form of its table.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub enum TrainingStats {
     /// For a table of Gaussians.

@@ -1,9 +1,9 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY, EARLY_VERSION, HEADER, LABEL_BYTES,
-    LENGTH, Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED, PACED_VERSION, PLAIN_VERSION,
-    SLOPES, TWO, TableError, Tally, VERSION, array, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY_VERSION, HEADER, LABEL_BYTES, LENGTH,
+    Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED_VERSION, PLAIN_VERSION, SLOPES, TWO,
+    TableError, Tally, VERSION, array, each,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::Whitened;
@@ -18,7 +18,7 @@ pub struct Table<'a> {
     pub(super) textures: u16,
     pub(super) movements: u8,
     pub(super) contents: Contents,
-    /// What is behind the names.
+    /// The bytes behind the names.
     pub(super) sections: &'a [u8],
     /// Variances of the drift of every movement; none where there is no drift.
     pub(super) drifts: &'a [u8],
@@ -28,13 +28,13 @@ pub struct Table<'a> {
     pub(super) slopes: &'a [u8],
 }
 
-/// What slides of one of the shorter lengths say, where it lies.
+/// The table of one of the shorter lengths, where it lies.
 #[derive(Clone, Copy)]
 pub(super) struct Length<'a> {
     pub(super) ms: u16,
-    /// What it has for them: without names and numbers.
+    /// Its table, without names and numbers.
     pub(super) table: Table<'a>,
-    /// What is behind the trials.
+    /// The bytes behind the trials.
     pub(super) rest: &'a [u8],
 }
 
@@ -72,8 +72,8 @@ impl<'a> Table<'a> {
             return Err(TableError::Magic([m0, m1, m2, m3]));
         }
         let version = u16::from_le_bytes([v0, v1]);
-        let paced = PACED && version == PACED_VERSION;
-        let early = EARLY && version == EARLY_VERSION;
+        let paced = version == PACED_VERSION;
+        let early = version == EARLY_VERSION;
         if version != VERSION && version != PLAIN_VERSION && !paced && !early {
             return Err(TableError::Version(version));
         }
@@ -112,19 +112,17 @@ impl<'a> Table<'a> {
         }
         table.check_sections()?;
         table.find_sections();
-        if PACED && paced == table.slopes.is_empty() {
+        if paced == table.slopes.is_empty() {
             return Err(TableError::Section(SLOPES));
         }
-        if EARLY {
-            let is_early = table.count_lengths().map(|lengths| lengths > 0);
-            if is_early != Some(early) || early && table.has_slopes() {
-                return Err(TableError::Section(LENGTH));
-            }
+        let is_early = table.count_lengths().map(|lengths| lengths > 0);
+        if is_early != Some(early) || early && table.is_paced() {
+            return Err(TableError::Section(LENGTH));
         }
         Ok(table)
     }
 
-    /// Where the names end.
+    /// Returns the end of the names.
     #[inline]
     fn check(&self) -> Result<usize, TableError> {
         let mut at = self.layout().names;
@@ -207,12 +205,13 @@ impl<'a> Table<'a> {
     /// The lengths that it knows, the shortest first.
     pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
         let table = *self;
-        let sections = if EARLY { self.sections } else { &[] };
-        let sections = each(sections).flatten().filter(|(kind, _)| *kind == LENGTH);
+        let sections = each(self.sections)
+            .flatten()
+            .filter(|(kind, _)| *kind == LENGTH);
         sections.map_while(move |(_, contents)| table.length_of(contents))
     }
 
-    /// What a section of kind 6 has; `None` where it is too short.
+    /// The contents of a section of kind 6; `None` where it is too short.
     pub(super) fn length_of(&self, contents: &'a [u8]) -> Option<Length<'a>> {
         let (ms, bytes) = contents.split_first_chunk::<MS>()?;
         let rest = bytes.get(self.layout().lineage..)?;
@@ -234,7 +233,7 @@ impl<'a> Table<'a> {
     /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
     #[inline(always)]
     pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        if !EARLY || movement < self.movements {
+        if movement < self.movements {
             return None;
         }
         self.find_shorter(movement)
@@ -295,7 +294,7 @@ impl<'a> Table<'a> {
     /// The bytes of the name at `at`, and where the next one begins; the checksum is no name.
     ///
     /// # Errors
-    /// Where the name would end, were it there.
+    /// The error is the end that the name would have.
     fn name_at(&self, at: usize) -> Result<(&'a [u8], usize), usize> {
         let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>().ok_or(at)?;
         let end = at + 1 + usize::from(*body.get(at).ok_or(at + 1)?);
@@ -307,7 +306,7 @@ impl<'a> Table<'a> {
         self.textures
     }
 
-    /// What the table knows of a texture.
+    /// The kind of data that the table holds of a texture.
     pub fn contents(&self) -> Contents {
         self.contents
     }
@@ -383,8 +382,8 @@ impl<'a> Table<'a> {
         self.bytes.get(at).copied().unwrap_or(0)
     }
 
-    /// What a property of a texture is expected to be; `None` where fewer than two trials were made, for a property that
-    /// was not measured, and outside the table.
+    /// The expected distribution of a property of a texture; `None` where fewer than two trials were made, for a
+    /// property that was not measured, and outside the table.
     pub fn gaussian(&self, texture: u16, action: Action) -> Option<Gaussian> {
         if self.trials(texture, action.movement) < 2 {
             return None;
@@ -429,8 +428,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside the
-    /// table.
+    /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside
+    /// the table.
     pub(super) fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
         let layout = self.layout();
         let at = layout.trials + usize::from(movement);
@@ -461,7 +460,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// How features are whitened at a movement; `None` in a table of Gaussians and outside the table.
+    /// The whitening of features at a movement; `None` in a table of Gaussians and outside the table.
     pub fn whitening(&self, movement: u8) -> Option<Whitening> {
         let (bytes, features) = self.bytes_from_whitening(movement)?;
         Whitening::read(bytes.get(..Whitening::bytes(features))?, features)
@@ -483,8 +482,8 @@ impl<'a> Table<'a> {
         Some((self.bytes.get(at..)?, features.into()))
     }
 
-    /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians and
-    /// outside the table.
+    /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians
+    /// and outside the table.
     pub fn white_mean(
         &self,
         texture: u16,
@@ -500,7 +499,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// What was learned of a texture at a movement in a fused table, to go on from.
+    /// The statistics of a texture at a movement in a fused table, to go on from.
     pub fn whitened(&self, texture: u16, movement: u8) -> Whitened {
         let mut whitened = Whitened {
             slides: self.trials(texture, movement),

@@ -1,18 +1,18 @@
 //! The space in which the slides of a texture scatter by 1 in every direction: from features to whitened features.
 //!
-//! The paper looks at one property per slide. Taking all features of a slide together needs their covariance; five trials of
-//! one texture do not give it, but those of all textures together do: [`super::whiten`].
+//! The paper looks at one property per slide. Taking all features of a slide together needs their covariance; five
+//! trials of one texture do not give it, but those of all textures together do: [`super::whiten`].
 
 use heapless::Vec;
 
 use super::PAIRS;
 use crate::features::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
 
-/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides within
-/// a texture, and the means of different textures are uncorrelated in z, those that scatter most first.
+/// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides
+/// within a texture, and the means of different textures are uncorrelated in z, those that scatter most first.
 ///
-/// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers, so
-/// their rounding adds no error.
+/// W is kept in whole numbers, row by row with a power of two of its own; means are learned through the same numbers,
+/// so their rounding adds no error.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Whitening {
     pub(super) features: usize,
@@ -69,7 +69,7 @@ impl Whitening {
         self.features
     }
 
-    /// What a change of the features by so many steps is in whitened ones, to the nearest 1/256.
+    /// The whitened change that a change of the features by so many steps makes, to the nearest 1/256.
     pub fn change(&self, steps: &[f64; MAX_FEATURES]) -> Slope {
         let view = View {
             features: self.features,
@@ -121,8 +121,8 @@ impl<'b> View<'b> {
         places.iter().all(|&p| p <= 30).then_some(view)
     }
 
-    /// Of bytes that begin with what [`View::new`] has found to be one. Of those behind it two may be read: a row is taken as
-    /// long as the longest.
+    /// Of bytes that begin with what [`View::new`] has found to be one. Of those behind it two may be read: a row is
+    /// taken as long as the longest.
     pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
         Self { features, bytes }
     }
@@ -191,7 +191,8 @@ pub(crate) fn fill(bytes: &[u8]) -> Row {
     filled
 }
 
-/// A row of a whitening where its table lies, or what it is multiplied with: as many numbers as the most features, two to a word.
+/// A row of a whitening where its table lies, or what it is multiplied with: as many numbers as the most features, two
+/// to a word.
 pub type Row = [u8; 2 * MAX_FEATURES];
 /// Numbers of 16 bits, two to a word, the first in the low half.
 pub type Words = [u32; PAIRS];
@@ -257,7 +258,7 @@ pub fn white(steps: i16) -> f32 {
     f32::from(steps) / WHITE_STEPS
 }
 
-/// What all textures are like at a movement, whitened.
+/// The whitened means of all textures at a movement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Column<'t> {
     /// Means, the first at the beginning, numbers of 16 bits, little-endian; each begins `stride` bytes after the one
@@ -276,7 +277,7 @@ impl<'t> Column<'t> {
         self.means.get(texture * self.stride..).unwrap_or_default()
     }
 
-    /// How many slides a texture was learned from.
+    /// The number of slides that a texture was learned from.
     #[inline]
     pub(crate) fn slides(&self, texture: usize) -> u8 {
         self.slides

@@ -4,7 +4,6 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::explorer::{Config, Method, Strategy};
-#[cfg(any(feature = "arm", test))]
 use crate::rig::arm::ArmReport;
 use crate::table::{Contents, MAX_TEXTURES, Name, is_false_alarm};
 
@@ -87,7 +86,6 @@ pub enum Command {
     TurnOver,
     /// An arm that moves the finger says how far it has come with what [`super::Event::Arm`] asked for: whenever that changes, and at
     /// least every 100 ms while it is open. Only a probe that an arm moves takes it, at any time. New in version 11.
-    #[cfg(any(feature = "arm", test))]
     Arm(ArmReport),
 }
 

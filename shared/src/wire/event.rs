@@ -13,7 +13,6 @@ use crate::features::{
     BLOCK, Block, FUSED_BANDS, Measurement, Movement, Observation, Properties, Property,
 };
 use crate::rig::Fault;
-#[cfg(any(feature = "arm", test))]
 use crate::rig::arm::ArmOrder;
 use crate::sensor::FingerCode;
 use crate::table::{Action, MAX_TEXTURES, Name};
@@ -172,7 +171,6 @@ pub enum Event {
     Early(u16),
     /// The arm that moves the finger is to do this, in the place of what it does; said again until the arm answers, with
     /// [`super::Command::Arm`]. New in version 11.
-    #[cfg(any(feature = "arm", test))]
     Arm(ArmOrder),
 }
 

@@ -23,7 +23,7 @@ pub(super) fn from_sources() -> Vec<(&'static str, &'static str, String)> {
         (
             "docs/src/store.md",
             "store",
-            section("shared/src", "What survives a power cut"),
+            section("shared/src", "The data that survives a power cut"),
         ),
         ("docs/src/store.md", "settings", settings()),
         ("docs/src/wire.md", "wire", wire()),
@@ -154,30 +154,24 @@ fn fields(of: &Fields) -> String {
 }
 
 fn wire() -> String {
-    let files: Vec<syn::File> = ["shared/src/wire.rs"]
-        .iter()
-        .map(|path| syn::parse_file(&read(path)).unwrap())
-        .chain(if super::root().join("shared/src/wire").is_dir() {
-            sources("shared/src/wire")
-        } else {
-            Vec::new()
-        })
-        .collect();
+    let mut files = sources("shared/src/wire");
+    files.insert(0, syn::parse_file(&read("shared/src/wire.rs")).unwrap());
     let items: Vec<&Item> = files.iter().flat_map(|file| &file.items).collect();
-    let an_enum = |names: &[&str]| -> Option<&ItemEnum> {
-        items.iter().find_map(|item| match item {
-            Item::Enum(found) if names.iter().any(|name| found.ident == name) => Some(found),
+    let an_enum = |name: &str| -> &ItemEnum {
+        let mut enums = items.iter().filter_map(|item| match item {
+            Item::Enum(found) if found.ident == name => Some(found),
             _ => None,
-        })
+        });
+        enums.next().unwrap_or_else(|| panic!("no enum {name}"))
     };
     let mut text = section("shared/src", "A frame is a message");
     text += "\nA message is in [postcard](https://postcard.jamesmunns.com)'s format, in which a variant is its number.\n";
     let mut told = Vec::new();
-    for (heading, names) in [
-        ("Commands of the host", ["Command", "Ask"]),
-        ("Events of the probe", ["Event", "Tell"]),
+    for (heading, name) in [
+        ("Commands of the host", "Command"),
+        ("Events of the probe", "Event"),
     ] {
-        let found = an_enum(&names).unwrap_or_else(|| panic!("no enum {names:?}"));
+        let found = an_enum(name);
         told.push(&found.ident);
         text += &format!(
             "\n## {heading}\n\n| number | `{}` | what it is | fields |\n|---|---|---|---|\n",
@@ -295,13 +289,8 @@ fn said(of: &Expr, folder: &str) -> String {
 fn gates() -> String {
     const XTASK: &str = "host-tools/xtask/src";
     let mut text = String::from("| limit | of | at most |\n|---|---|---|\n");
-    for row in rows(&constant(XTASK, "MAX_FLASH").unwrap()) {
-        text += &format!(
-            "| flash without its table | {} | {} |\n",
-            said(&row[0], XTASK),
-            number(&row[1])
-        );
-    }
+    let flash = number(&constant(XTASK, "MAX_FLASH").unwrap());
+    text += &format!("| flash | each image | {flash} |\n");
     let variables = number(&constant(XTASK, "MAX_VARIABLES").unwrap());
     text += &format!("| variables | each image | {variables} |\n");
     const EMULATOR: &str = "host-tools/emulator/src";

@@ -4,8 +4,8 @@
 //! Checksums would keep all mutations out: where a format has one, the target puts the right one behind the bytes, unless the
 //! first byte says to leave them as they are.
 //!
-//! With the feature `planted` every target has a bug that only an input which is nearly right can find: `cargo xtask fuzz
-//! --planted` shows that it is found.
+//! With the feature `planted` every target has a bug that only an input which is nearly right can find: `cargo xtask
+//! campaign planted` shows that it is found.
 
 mod flash;
 mod folder;

@@ -3,17 +3,17 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use tactus_core::explorer::{self, Config, SlideTime, Strategy};
+use tactus_core::explorer::Config;
 use tactus_core::features::FeatureSet;
 use tactus_core::table::{Drift, MAX_LENGTHS, is_false_alarm};
 use tactus_lab::eval::evaluate::Method;
 
-use super::config;
+use super::environment;
 use super::output::UsageError;
 
 #[derive(Args, Clone)]
 pub(crate) struct Recordings {
-    /// Folder of recordings; that of TACTUS_RECORDINGS or of tactus.toml unless given
+    /// Folder of recordings; that of TACTUS_RECORDINGS unless given
     #[arg(long, value_name = "DIR")]
     pub(crate) recordings: Option<PathBuf>,
 }
@@ -25,8 +25,8 @@ impl Recordings {
     /// Neither does.
     pub(crate) fn folder(&self) -> Result<PathBuf, UsageError> {
         let folder = self.recordings.clone();
-        folder.or_else(config::recordings).ok_or_else(|| {
-            let say = "give a folder of recordings: --recordings DIR, TACTUS_RECORDINGS in the environment, or `recordings` in tactus.toml";
+        folder.or_else(environment::recordings).ok_or_else(|| {
+            let say = "give a folder of recordings: --recordings DIR, or TACTUS_RECORDINGS in the environment";
             UsageError(say.to_owned())
         })
     }
@@ -167,67 +167,5 @@ impl Features {
             Self::Bands => FeatureSet::Bands,
             Self::Properties => FeatureSet::Properties,
         }
-    }
-}
-
-/// What the next movement is chosen for.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Objective {
-    /// The greatest benefit, whatever it takes
-    Bits,
-    /// The most bits per second: a slow slide has to tell more
-    BitsPerSecond,
-}
-
-/// What movements are chosen for, by a method that looks ahead.
-#[derive(Args, Clone)]
-pub(crate) struct Choosing {
-    /// What to choose the next movement for, and say how long explorations take
-    #[arg(long, value_enum)]
-    pub(crate) objective: Option<Objective>,
-    /// With --objective, what a slide takes besides the time at its speed: approach, pressing, lifting, s; that of the reference
-    /// rig unless given, 2 with --fabrics
-    #[arg(long, value_name = "S", requires = "objective", value_parser = overhead)]
-    pub(crate) overhead: Option<f32>,
-}
-
-fn overhead(text: &str) -> Result<f32, String> {
-    match text.parse() {
-        Ok(s) if (0.0..=600.0).contains(&s) => Ok(s),
-        _ => Err("seconds from 0 to 600, such as 4".to_owned()),
-    }
-}
-
-impl Choosing {
-    /// How long slides take, where that was asked for; `usual`, but for the overhead.
-    pub(crate) fn time(&self, usual: SlideTime) -> Option<SlideTime> {
-        self.objective?;
-        let overhead_s = self.overhead.unwrap_or(usual.overhead_s);
-        Some(SlideTime {
-            overhead_s,
-            ..usual
-        })
-    }
-
-    /// The same exploration, with this objective.
-    ///
-    /// # Errors
-    /// The method does not look ahead.
-    pub(crate) fn config(&self, config: Config, usual: SlideTime) -> Result<Config, UsageError> {
-        let time = self.time(usual);
-        if time.is_some() && config.strategy != Strategy::Bayesian {
-            let say =
-                "--objective needs a method that looks ahead: fused, student-all, student or paper";
-            return Err(UsageError(say.to_owned()));
-        }
-        let by_rate = time.filter(|_| self.objective == Some(Objective::BitsPerSecond));
-        let objective = by_rate.map_or(
-            explorer::Objective::Bits,
-            explorer::Objective::BitsPerSecond,
-        );
-        Ok(Config {
-            objective,
-            ..config
-        })
     }
 }

@@ -2,8 +2,6 @@
 
 pub(super) mod mcap;
 mod npz;
-mod parquet;
-mod picture;
 mod to;
 
 use std::io::Write;
@@ -17,21 +15,16 @@ use tactus_lab::data::replay::measure_all;
 
 use self::to::create;
 use super::output::{Format, UsageError, print_json};
-use super::plot::Plot;
 use super::progress::with_progress;
-use super::table_file::{is_pipe, read_table};
+use super::table_file::is_pipe;
 
-/// Convert recordings or a session's log for other tools: MCAP (Foxglove, PlotJuggler), npz (numpy), Parquet
+/// Convert recordings or a session's log for other tools: MCAP (Foxglove, PlotJuggler), npz (numpy)
 #[derive(clap::Args)]
-#[command(group(ArgGroup::new("kind").args(["mcap", "npz", "parquet"]).required(true).multiple(true)), after_help = "\
+#[command(group(ArgGroup::new("kind").args(["mcap", "npz"]).required(true).multiple(true)), after_help = "\
 Examples:
   tactus convert session.jsonl --mcap session.mcap    a log of `tactus device ... --log session.jsonl`
   tactus convert recordings --mcap recordings.mcap    all slides, one after the other
-  tactus convert session.jsonl --mcap session.mcap --plot channels.svg    and what it shows
   tactus convert recordings --npz recordings.npz      numpy.load(\"recordings.npz\")
-  tactus convert recordings --parquet slides.parquet --table FILE
-                                                      features of each slide, and what it says of the table's textures
-  tactus convert session.jsonl --parquet - | duckdb   to standard output
 
 In an .npz, `pac_7`, `pdc_7`, `shear_7` and `still_7` are the streams of the slide of row 7 of `texture`, `slide`, `movement`, `properties` and
 `ln_bands`. The book lists the channels of an .mcap.")]
@@ -44,14 +37,6 @@ pub(crate) struct Args {
     /// Write an .npz file; of recordings only
     #[arg(long, value_name = "FILE")]
     npz: Option<PathBuf>,
-    /// Write a Parquet file: a row for each slide
-    #[arg(long, value_name = "FILE")]
-    parquet: Option<PathBuf>,
-    /// With --parquet and recordings: a table, whose textures each slide is compared with
-    #[arg(long, value_name = "FILE", requires = "parquet")]
-    table: Option<PathBuf>,
-    #[command(flatten)]
-    plot: Plot,
     /// How to print what was written
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -66,42 +51,23 @@ struct Written {
 
 /// Writes what was asked for; a file that is there already is left alone.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let asked = [&args.mcap, &args.npz, &args.parquet];
+    let asked = [&args.mcap, &args.npz];
     let asked: Vec<&PathBuf> = asked.into_iter().flatten().collect();
     let piped = asked.iter().filter(|path| is_pipe(path)).count();
     if piped > 1 || (piped == 1 && args.format == Format::Json) {
         let say = "one file alone can go to standard output (\"-\")";
         return Err(UsageError(say.to_owned()).into());
     }
-    let shown = args.mcap.as_deref().filter(|path| !is_pipe(path));
-    if args.plot.is_asked() && shown.is_none() {
-        let say = "--plot draws what an MCAP file shows: give --mcap FILE, too";
-        return Err(UsageError(say.to_owned()).into());
-    }
-    let canvas = args.plot.open()?;
     let is_set = args.from.is_dir();
     let from = args.from.display();
     ensure!(
         is_set || args.npz.is_none(),
-        "{from}: an .npz holds recordings; name a folder of them, or write --mcap or --parquet",
-    );
-    ensure!(
-        is_set || args.table.is_none(),
-        "{from}: a log has the posteriors of its own table; --table is for recordings"
+        "{from}: an .npz holds recordings; name a folder of them, or write --mcap",
     );
     if is_set {
         of_recordings(args)?;
-    } else {
-        ensure!(
-            asked.len() == 1 || !is_pipe(&args.from),
-            "a log from standard input (\"-\") becomes one file"
-        );
-        if let Some(path) = &args.mcap {
-            mcap::log(create(path)?, &args.from)?;
-        }
-        if let Some(path) = &args.parquet {
-            parquet::log(create(path)?, &args.from)?;
-        }
+    } else if let Some(path) = &args.mcap {
+        mcap::log(create(path)?, &args.from)?;
     }
     let mut files = Vec::new();
     for path in asked {
@@ -119,9 +85,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             writeln!(out, "{file}: {bytes} bytes")?;
         }
     }
-    if let (Some(canvas), Some(file)) = (canvas, shown) {
-        canvas.write("tactus convert", &[picture::draw(file)?], out)?;
-    }
     Ok(())
 }
 
@@ -134,23 +97,14 @@ fn of_recordings(args: &Args) -> anyhow::Result<()> {
             mcap::recordings(to, &set, done)
         })?;
     }
-    if args.npz.is_none() && args.parquet.is_none() {
-        return Ok(());
-    }
-    let measured = with_progress(textures, "measuring slides", |done| {
-        measure_all(&set, |_| done())
-    })?;
     if let Some(path) = &args.npz {
+        let measured = with_progress(textures, "measuring slides", |done| {
+            measure_all(&set, |_| done())
+        })?;
         let to = create(path)?;
         with_progress(textures, "converting textures", |done| {
             npz::write(to, &set, &measured, done)
         })?;
-    }
-    if let Some(path) = &args.parquet {
-        let mut bytes = Vec::new();
-        let table = args.table.as_deref();
-        let table = table.map(|file| read_table(file, &mut bytes)).transpose()?;
-        parquet::recordings(create(path)?, &set, &measured, table)?;
     }
     Ok(())
 }

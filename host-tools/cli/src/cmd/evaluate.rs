@@ -35,27 +35,19 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "--novelty, --verify and --lifelong need --method fused: the other methods do not recognise new textures"
     );
     if args.early {
-        let config = args
-            .choosing
-            .config(args.stop.config(args.method), args.slide_time())?;
-        return early::run(args, config, out);
+        return early::run(args, args.stop.config(args.method), out);
     }
     let canvas = args.plot.open()?;
     let (experiment, protocol) = experiment::open(args)?;
-    ensure!(
-        args.choosing.objective.is_none() || args.properties.is_none(),
-        "--objective needs movements of which the speed is known, and --properties has none"
-    );
     let config = args.stop.config(args.method);
-    let config = args.choosing.config(config, args.slide_time())?;
     if args.lifelong {
-        return novelty::lifelong(args, &experiment, config, canvas, out);
+        return novelty::lifelong(args, &experiment, config, out);
     }
     if args.verify {
         return verify::run(args, &experiment, protocol, config, canvas, out);
     }
     if args.novelty.is_some() {
-        return novelty::leave_one_out(args, &experiment, protocol, config, canvas, out);
+        return novelty::leave_one_out(args, &experiment, protocol, config, out);
     }
     // a program gets what the pictures show
     let with_courses = canvas.is_some() || args.format == Format::Json;
@@ -65,7 +57,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         runs: args.runs(),
         seed: args.seed,
         config,
-        time: args.choosing.time(args.slide_time()),
         with_courses,
     };
     let names = experiment.names().to_vec();
@@ -102,10 +93,8 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     let share = |share: f64| format!("{:5.1} %", share * 100.0);
     writeln!(
         out,
-        "what the user is told, after {:.2} slides{} (mean)",
-        e.mean_slides_told,
-        e.mean_seconds_told
-            .map_or(String::new(), |s| format!(", {s:.1} s"))
+        "what the user is told, after {:.2} slides (mean)",
+        e.mean_slides_told
     )?;
     for (name, value, remark) in verdict_rows(&e.verdicts) {
         writeln!(out, "{}", row(name, share(value) + &remark))?;

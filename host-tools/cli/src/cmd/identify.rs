@@ -1,9 +1,7 @@
 //! `tactus identify`: an exploration shown step by step, on recordings and on the simulated rig.
 
-use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, ensure};
 use clap::Parser;
@@ -22,15 +20,13 @@ use tactus_lab::eval::evaluate::{MAX_TEXTURES, Method};
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::first::at_least_two;
 use tactus_lab::eval::learn::Expected;
-use tactus_lab::eval::seconds;
 use tactus_lab::eval::show::{Show, count, is_right};
 use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_lab::sim::rig::SimRig;
 use tactus_study::pictures::exploration::Exploration;
-use tactus_study::pictures::timeline::{Timeline, Watch};
 
-use super::args::{Choosing, Expecting, Recordings, Stop, length, rising};
+use super::args::{Expecting, Recordings, Stop, length, rising};
 use super::learn::learned_here;
 use super::output::{Done, Format, UsageError, print_json};
 use super::plot::{Canvas, Plot};
@@ -64,8 +60,8 @@ Examples:
   tactus identify --simulated --early                         a slide ends when that is certain
   tactus identify --simulated --plot burlap.svg               with pictures
 
---plot draws how probable each texture was (posterior), the unknown beside its two best candidates (spectrum), and the last
-slide over time (timeline).")]
+--plot draws how probable each texture was (posterior), and the unknown beside its two best
+candidates (spectrum).")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
@@ -100,8 +96,6 @@ pub(crate) struct Args {
     expecting: Expecting,
     #[command(flatten)]
     stop: Stop,
-    #[command(flatten)]
-    choosing: Choosing,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -222,23 +216,12 @@ fn identify_recorded(
         )?;
     }
     let ran_out = |why: &ReplayError| matches!(why, ReplayError::RanOut(_));
-    let mut pictures = Pictures::new(table);
-    let found = explore_and_show(
-        &mut rig,
-        &mut pictures,
-        args,
-        &mut random,
-        name,
-        ran_out,
-        out,
-    )?;
+    let mut presented = Presented::new(name, table);
+    let found = explore_and_show(&mut rig, &mut presented, args, &mut random, ran_out, out)?;
     if !is_text {
         print_json(&found, out)?;
     }
-    if let Some(canvas) = canvas {
-        let last = rig.last().map(Timeline::of_recording);
-        pictures.draw(canvas, args, last.as_ref(), out)?;
-    }
+    presented.draw(canvas, args, out)?;
     Ok(found.done())
 }
 
@@ -251,44 +234,26 @@ impl Identification {
     }
 }
 
-/// What is to be drawn of an exploration.
-struct Pictures<'t> {
+/// The texture under the finger, and the exploration that is drawn.
+struct Presented<'t> {
+    name: &'t str,
     exploration: Exploration<'t>,
-    /// The slide in progress, where the rig reports it.
-    watch: Arc<Mutex<Watch>>,
 }
 
-impl<'t> Pictures<'t> {
-    fn new(table: Table<'t>) -> Self {
-        Self {
-            exploration: Exploration::new(table),
-            watch: Arc::default(),
-        }
-    }
-
-    fn step<E: Display>(&mut self, step: &ExplorationStep<'_, E>, table: Table<'_>) {
-        self.exploration.step(step);
-        let mut watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
-        match step {
-            ExplorationStep::Chosen(action, _) => {
-                if let Some(movement) = table.movement(action.movement) {
-                    watch.begin(movement);
-                }
-            }
-            ExplorationStep::Measured(..) => watch.counted(),
-            _ => {}
-        }
+impl<'t> Presented<'t> {
+    fn new(name: &'t str, table: Table<'t>) -> Self {
+        let exploration = Exploration::new(table);
+        Self { name, exploration }
     }
 
     fn draw(
         &self,
-        canvas: Canvas,
+        canvas: Option<Canvas>,
         args: &Args,
-        last: Option<&Timeline>,
         out: &mut impl Write,
     ) -> anyhow::Result<()> {
-        let mut figures = self.exploration.figures(args.stop.threshold)?;
-        figures.extend(last.map(Timeline::figure).transpose()?);
+        let Some(canvas) = canvas else { return Ok(()) };
+        let figures = self.exploration.figures(args.stop.threshold)?;
         canvas.write("tactus identify", &figures, out)
     }
 }
@@ -297,24 +262,23 @@ impl<'t> Pictures<'t> {
 /// every step.
 fn explore_and_show<R>(
     rig: &mut R,
-    pictures: &mut Pictures<'_>,
+    presented: &mut Presented<'_>,
     args: &Args,
     random: &mut ChaCha8Rng,
-    truth: &str,
     ran_out: impl Fn(&R::Error) -> bool,
     out: &mut impl Write,
 ) -> anyhow::Result<Identification>
 where
     R: Rig<Error: std::error::Error + Send + Sync + 'static>,
 {
-    let table = pictures.exploration.table();
+    let truth = presented.name;
+    let table = presented.exploration.table();
     let best = Method::of(explorer::Method::of(table.contents()));
     let method = args.method.unwrap_or(best);
     let config = Config {
         open: true,
         ..args.stop.config(method)
     };
-    let config = args.choosing.config(config, seconds::RIG)?;
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
     let mut slides = Transcript::default();
@@ -327,7 +291,7 @@ where
         || random.next_u32(),
         |event| {
             slides.step(&event, table);
-            pictures.step(&event, table);
+            presented.exploration.step(&event);
             if let ExplorationStep::Chosen(action, expected) = &event {
                 let movement = table.movement(action.movement).map(|m| m.to_string());
                 let property = action.property.map(|p| p.to_string());
@@ -449,15 +413,8 @@ fn identify_simulated(
         )?;
     }
     let never = |_: &_| false;
-    let mut pictures = Pictures::new(table);
-    if canvas.is_some() {
-        let watch = Arc::clone(&pictures.watch);
-        rig.listen(Box::new(move |at_ms, event| {
-            let mut watch = watch.lock().unwrap_or_else(PoisonError::into_inner);
-            watch.report(at_ms, &event);
-        }));
-    }
-    let found = explore_and_show(&mut rig, &mut pictures, args, &mut random, name, never, out)?;
+    let mut presented = Presented::new(name, table);
+    let found = explore_and_show(&mut rig, &mut presented, args, &mut random, never, out)?;
     let seconds = rig.now().as_secs_f64();
     let sliding_s: f64 = rig.performed().iter().map(|made| made.steady_s).sum();
     let skin = rig.control().skin();
@@ -480,12 +437,6 @@ fn identify_simulated(
     } else {
         print_json(&found, out)?;
     }
-    if let Some(canvas) = canvas {
-        let watch = pictures
-            .watch
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        pictures.draw(canvas, args, watch.last(), out)?;
-    }
+    presented.draw(canvas, args, out)?;
     Ok(found.done())
 }

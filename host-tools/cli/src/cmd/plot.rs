@@ -45,23 +45,13 @@ fn target(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// The name of a picture.
-pub(crate) fn svg_file(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if is_svg(&path) {
-        Ok(path)
-    } else {
-        Err("a picture is SVG: give FILE.svg".to_owned())
-    }
-}
-
 fn is_svg(path: &Path) -> bool {
     path.extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("svg"))
 }
 
 impl Plot {
-    /// Whether pictures are wanted.
+    /// Says whether pictures are wanted.
     pub(crate) fn is_asked(&self) -> bool {
         self.plot.is_some()
     }

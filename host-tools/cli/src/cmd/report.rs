@@ -1,4 +1,6 @@
-//! `tactus report`: what a table is good for, on one page.
+//! `tactus report`: what a table is good for, on one page; without a table, how repeatable slides are.
+
+mod repeatability;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -13,32 +15,43 @@ use tactus_lab::eval::show::count;
 use tactus_study::page::render;
 use tactus_study::pictures::map;
 
+use super::args::Recordings;
 use super::learn::learned_here;
-use super::output::{Format, percent, print_json, verdict_rows};
+use super::output::{Format, UsageError, percent, print_json, verdict_rows};
+use super::plot::Plot;
 use super::progress::{notice, progress};
 use super::table_file::read_table;
 use super::textures::{measure_folder, of_one_finger};
 
-/// Say what a table is good for: which textures are told apart, how soon, and what would help
+/// Say what a table is good for, or how repeatable recorded slides are by part and operator
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   tactus report TABLE                                        textures, nearest pairs, advice
   tactus report TABLE --recordings DIR --out report.html     and what users would be told, as a page
+  tactus report --recordings DIR                             variance by part, operator and repetition
+  tactus report --recordings ANNA --recordings BEN --plot charts    two operators, and control charts
+  tactus device record cork felt --slides 5 --operator Anna --lot 7 --out ANNA
 
-Slides that the table was learned from do not count, where it was learned from this very folder.")]
+Slides that the table was learned from do not count, where it was learned from this very folder.
+Without a table, a part is a texture, or a lot of it. Operators are compared if each of them touched
+every part. Below 10 % of all variation a gauge is usually called good, above 30 % not acceptable; it
+should tell at least five classes apart.")]
 pub(crate) struct Args {
-    /// The table
-    table: PathBuf,
-    /// Recordings to explore with it; they may hold textures that it does not have
+    /// The table; without it, the variance of the recorded slides is told
+    table: Option<PathBuf>,
+    /// Recordings to explore with the table; they may hold textures that it does not have. Without a
+    /// table it may be given several times, for a study of several operators
     #[arg(long, value_name = "DIR")]
-    recordings: Option<PathBuf>,
+    recordings: Vec<PathBuf>,
     /// Seed of the explorations
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// The page to write; a page that is there is replaced
-    #[arg(long, value_name = "FILE.html")]
+    #[arg(long, value_name = "FILE.html", requires = "table")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// How to print the report
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -54,26 +67,39 @@ struct Page<'r> {
     map: String,
 }
 
-/// Reports on a table.
+/// Reports on a table, or on recorded slides.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    if let Some(table) = &args.table {
+        return of_table(table, args, out);
+    }
+    let mut folders = args.recordings.clone();
+    if folders.is_empty() {
+        folders.push(Recordings { recordings: None }.folder()?);
+    }
+    repeatability::run(&folders, &args.plot, args.format, out)
+}
+
+fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    if args.recordings.len() > 1 || args.plot.is_asked() {
+        let say = "with a table, give --recordings once and no --plot";
+        return Err(UsageError(say.to_owned()).into());
+    }
     let mut bytes = Vec::new();
-    let table = read_table(&args.table, &mut bytes)?;
-    let slides = match &args.recordings {
-        Some(folder) => Some(unseen(folder, table)?),
-        None => None,
-    };
+    let table = read_table(file, &mut bytes)?;
+    let folder = args.recordings.first();
+    let slides = folder.map(|folder| unseen(folder, table)).transpose()?;
     let runs = slides
         .as_ref()
         .map_or(0, |slides| RUNS * slides.len() as u64);
     let bar = progress(runs, "exploring");
     let report = Report::new(table, slides.as_deref(), args.seed, || bar.inc(1));
     bar.finish_and_clear();
-    let report = report.with_context(|| args.table.display().to_string())?;
+    let report = report.with_context(|| file.display().to_string())?;
     if let Some(path) = &args.out {
         let page = Page {
-            name: args.table.display().to_string(),
+            name: file.display().to_string(),
             version: env!("CARGO_PKG_VERSION"),
-            command: command(args),
+            command: command(file, args),
             report: &report,
             map: map::figure(table)?.svg,
         };
@@ -91,9 +117,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn command(args: &Args) -> String {
-    let mut command = format!("tactus report {}", args.table.display());
-    if let Some(folder) = &args.recordings {
+fn command(file: &Path, args: &Args) -> String {
+    let mut command = format!("tactus report {}", file.display());
+    if let Some(folder) = args.recordings.first() {
         command += &format!(" --recordings {} --seed {}", folder.display(), args.seed);
     }
     command

@@ -212,9 +212,6 @@ impl Driver {
         for ((id, actuated), shown) in ids.into_iter().zip(now).zip(&mut self.switches) {
             if *shown != Some(actuated) {
                 *shown = Some(actuated);
-                if id == pins::E_STOP {
-                    lock(&self.rig).stop_line(at.0, actuated);
-                }
                 board.drive(at, id, (!actuated).then_some(false));
             }
         }

@@ -526,7 +526,7 @@ impl Emulator {
         })
     }
 
-    /// Address and size, bytes, of the one symbol that has `name` as its name or in it; names in the ELF are mangled.
+    /// The address and the size, in bytes, of the one symbol that has `name` as its path or in it.
     ///
     /// # Errors
     /// [`Error::Symbol`].

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// The ELF cannot be read.
-    #[error("cannot read {}: {source}. Build the firmware with `cargo xtask build`", path.display())]
+    #[error("cannot read {}: {source}. Build the firmware with `cargo xtask size`", path.display())]
     Read {
         /// Its path.
         path: PathBuf,

@@ -33,7 +33,7 @@ impl spi::Peer for SensorPins {
     fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
         let mut rig = lock(&self.0);
         let now = context.now().0;
-        let miso = if bits == 8 {
+        if bits == 8 {
             rig.spi_byte(now, mosi as u8).into()
         } else {
             // its first byte was over half way
@@ -41,9 +41,7 @@ impl spi::Peer for SensorPins {
             let first = rig.spi_byte(half, (mosi >> 8) as u8);
             let second = rig.spi_byte(now, mosi as u8);
             u16::from_be_bytes([first, second]).into()
-        };
-        rig.spi_frame(now, bits, mosi, miso);
-        miso
+        }
     }
 }
 

@@ -12,7 +12,6 @@ use super::line::LineNoise;
 use super::motion::MotionPeer;
 use super::options::Options;
 use super::record::{Recorder, Slide, Touch};
-use super::scope::{BridgePwm, Frame, Scope};
 use super::wave::Wave;
 
 /// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at 2.7 V
@@ -30,7 +29,6 @@ const READ_Z: u8 = 0xAC;
 const CR1_MODE: u64 = 0b11;
 const CR1_LSB_FIRST: u64 = 1 << 7;
 /// Where its baud rate begins: the clock is divided by 2^(BR + 1).
-const CR1_BR: u64 = 3;
 
 /// The rig, which the emulator's thread and its owner look at in turn.
 pub(crate) type SharedRig = Arc<Mutex<Rig>>;
@@ -90,7 +88,6 @@ pub struct Rig {
     encoder_lines: (bool, bool),
     trace_ns: u64,
     trace: VecDeque<(u64, Output)>,
-    scope: Option<Scope>,
     recorder: Recorder,
     commands: u64,
     display: Display,
@@ -145,7 +142,6 @@ impl Rig {
             encoder_lines: (false, false),
             trace_ns: options.trace_s * 1_000_000_000,
             trace: VecDeque::new(),
-            scope: None,
             recorder: Recorder::default(),
             commands: 0,
             display: Display::default(),
@@ -165,21 +161,6 @@ impl Rig {
     /// ([`Options::trace_s`](super::Options::trace_s)).
     pub fn trace(&self) -> impl Iterator<Item = &(u64, Output)> {
         self.trace.iter()
-    }
-
-    /// Puts an oscilloscope's probes to the pins, and gives what they saw since that was done last.
-    pub fn probe_pins(&mut self) -> Scope {
-        self.scope.replace(Scope::default()).unwrap_or_default()
-    }
-
-    /// The stage's PWM now; `None` while its timer stands.
-    pub fn bridge_pwm(&self) -> Option<BridgePwm> {
-        let now = self.wave?.phase(self.world.now_ns())?;
-        Some(BridgePwm {
-            period_s: now.period_s,
-            duty: self.duty_timer,
-            since_s: now.since_s,
-        })
     }
 
     /// The handheld's display.
@@ -291,17 +272,7 @@ impl Rig {
             Some(phase) => self.world.motor_adc_within(phase),
             None => self.world.motor_adc(),
         };
-        if let Some(scope) = &mut self.scope {
-            scope.current.push((now_ns, counts));
-        }
         counts
-    }
-
-    /// The level of the emergency stop's pin.
-    pub(super) fn stop_line(&mut self, now_ns: u64, high: bool) {
-        if let Some(scope) = &mut self.scope {
-            scope.stop.push((now_ns, high));
-        }
     }
 
     /// PWM as an output of its port; `None` leaves it to the timer.
@@ -343,9 +314,6 @@ impl Rig {
         }
         self.selected = selected.then_some(part);
         let commanded = std::mem::take(&mut self.commanded);
-        if let Some(scope) = &mut self.scope {
-            scope.select.push((now_ns, !selected));
-        }
         if selected {
             self.selected_ns = now_ns;
             self.bytes = 0;
@@ -376,20 +344,6 @@ impl Rig {
     /// CR1 of SPI1.
     pub(crate) fn spi_control(&mut self, cr1: u64) {
         self.spi_control = cr1;
-    }
-
-    /// A frame over the sensor's bus was over.
-    pub(super) fn spi_frame(&mut self, at_ns: u64, bits: u8, mosi: u32, miso: u32) {
-        let divider = 2 << (self.spi_control >> CR1_BR & 0b111);
-        if let Some(scope) = &mut self.scope {
-            scope.frames.push(Frame {
-                at_ns,
-                bits,
-                mosi,
-                miso,
-                divider,
-            });
-        }
     }
 
     /// A byte over the sensor's bus, at its end.
@@ -471,9 +425,6 @@ impl Rig {
     pub(crate) fn next_encoder_lines(&mut self) -> Option<(bool, bool)> {
         let edge = self.world.next_encoder_edge()?;
         self.encoder_lines = (edge.a, edge.b);
-        if let Some(scope) = &mut self.scope {
-            scope.encoder.push(edge);
-        }
         Some(self.encoder_lines())
     }
 

@@ -14,7 +14,7 @@ pub(super) fn code(elf: &[u8]) -> object::Result<Vec<Range<u64>>> {
     Ok(ranges.collect())
 }
 
-/// Functions and variables.
+/// Functions and variables, by their paths: compilers mangle them in more than one way.
 pub(super) fn symbols(elf: &[u8]) -> object::Result<Vec<(String, u64, u64)>> {
     let file = object::File::parse(elf)?;
     let mut symbols = Vec::new();
@@ -25,7 +25,8 @@ pub(super) fn symbols(elf: &[u8]) -> object::Result<Vec<(String, u64, u64)>> {
             _ => continue,
         };
         if symbol.is_definition() {
-            symbols.push((symbol.name()?.to_owned(), address, symbol.size()));
+            let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
+            symbols.push((name, address, symbol.size()));
         }
     }
     Ok(symbols)

@@ -13,7 +13,7 @@ use crate::board::Error;
 /// The firmware that runs.
 #[derive(Args)]
 pub struct Firmware {
-    /// The firmware: what `cargo xtask build` names
+    /// The firmware: what `cargo xtask size` names
     #[arg(long, value_name = "PATH")]
     pub elf: PathBuf,
 }

@@ -9,7 +9,6 @@ use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
 use super::cuts::held::CutError;
-use super::scope::error::ScopeError;
 use super::soak::day::DayError;
 use super::soak::hour_report::HourError;
 
@@ -46,6 +45,4 @@ pub(crate) enum RunError {
     NoSlide,
     #[error("the display has no verdict in its headline")]
     NoVerdict,
-    #[error(transparent)]
-    Scope(#[from] ScopeError),
 }

@@ -36,8 +36,8 @@ const FACTORY: &[u8] = factory::RIG;
 /// Each case is written as it ends; those that are written already are not run again.
 #[derive(Arguments)]
 #[command(after_help = "Examples:
-  cargo xtask campaign --faults 2000                      seeds 1 to 2000, or what is left of them
-  cargo xtask campaign --faults 1 --seed 17 --again       one of them once more")]
+  cargo xtask campaign faults --seeds 1-2000              seeds 1 to 2000, or what is left of them
+  cargo xtask campaign faults --seeds 17 -- --again       one of them once more")]
 pub(crate) struct Args {
     /// How many cases
     #[arg(long, value_name = "N")]
@@ -54,7 +54,7 @@ pub(crate) struct Args {
     /// On emulated boards, with the real firmware; write these cases into another file
     #[arg(long, requires = "elf")]
     board: bool,
-    /// The firmware of the boards: what `cargo xtask build` names
+    /// The firmware of the boards: what `cargo xtask size` names
     #[arg(long, value_name = "PATH")]
     elf: Option<PathBuf>,
     /// How many cases at once; as many as there are cores unless given
@@ -202,12 +202,12 @@ fn failed(line: &Value) -> Option<String> {
     let wrong: Vec<&str> = wrong.iter().filter_map(Value::as_str).collect();
     (!wrong.is_empty()).then(|| {
         format!(
-            "seed {seed}: {}, {}: FAILED: {}\n    again: cargo xtask campaign --faults 1 --seed {seed} --again{}{}",
+            "seed {seed}: {}, {}: FAILED: {}\n    again: cargo xtask campaign {}faults --seeds {seed} -- --again{}",
             line["activity"].as_str().unwrap_or_default(),
             line["faults"],
             wrong.join("; "),
+            if line["board"] == true { "board-" } else { "" },
             if line["stiff"] == true { " --stiff" } else { "" },
-            if line["board"] == true { " --board" } else { "" },
             seed = line["seed"],
         )
     })

@@ -12,7 +12,7 @@ use tactus_world::textures::TEXTURES;
 use super::error::RunError;
 use crate::board::{Display, Emulator, Error};
 use crate::host::args::{Firmware, Format};
-use crate::host::timeline::{Part, Timeline};
+use crate::host::milestones::Milestones;
 use crate::scenario::{self, PlayError, Seen};
 
 /// The firmware's table is of this world.
@@ -113,7 +113,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let _ = session.request(Command::Status, &mut status);
     let played = scenario::play_to(&scenario, args.finger, &args.firmware.elf, None, &status)?;
     let mut board = played.board;
-    let timeline = timeline(&board, &played.seen);
+    let times = milestones(&board, &played.seen);
     let heard = Heard::of(&mut board, session)?;
     let seconds = board.now_ns() as f64 * 1e-9;
     // negative where the verdict was there before the hand stood
@@ -151,9 +151,8 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             "says": says,
             "verdict": verdict,
             "seconds": seconds,
-            "seconds_to_ready": timeline.seconds_to_ready(),
-            "seconds_to_verdict": timeline.seconds_to_verdict(),
-            "timeline": timeline.json(),
+            "seconds_to_ready": times.seconds_to_ready(),
+            "seconds_to_verdict": times.seconds_to_verdict(),
             "slides": board.rig().slides().len(),
             "slide_end_to_screen_s": end_to_screen_s,
             "awake": awake,
@@ -176,7 +175,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     }
     println!(
         "{}{seconds:.1} s of the board's time.",
-        timeline.sentence("touch")
+        times.sentence("touch")
     );
     if let Some(seconds) = end_to_screen_s {
         let when = if seconds < 0.0 { "before" } else { "after" };
@@ -191,60 +190,26 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     Ok(())
 }
 
-/// What time went to, by the world's contacts and slides and by what the display showed.
-fn timeline(board: &Emulator, seen: &[(u64, Seen)]) -> Timeline {
-    /// What begins where several things happen at once, in the order in which they do.
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-    enum Mark {
-        Ready,
-        Spent(Part),
-        Verdict,
+/// Finds the milestones by the world's touches and by what the display showed.
+fn milestones(board: &Emulator, seen: &[(u64, Seen)]) -> Milestones {
+    let mut times = Milestones::default();
+    let touched_ns = board.rig().touches().first().map(|touch| touch.began_ns);
+    if let Some(touched_ns) = touched_ns {
+        times.begin(touched_ns);
     }
-    let rig = board.rig();
-    let mut marks = Vec::new();
-    for touch in rig.touches() {
-        marks.push((touch.began_ns, Mark::Spent(Part::Settle)));
-        let off = touch.ended_ns;
-        marks.extend(off.map(|at_ns| (at_ns, Mark::Spent(Part::Lift))));
-    }
-    for slide in rig.slides() {
-        marks.push((slide.began_ns, Mark::Spent(Part::Slide)));
-        let off = Some(slide.ended_ns);
-        let lifted = rig.touches().iter().any(|touch| touch.ended_ns == off);
-        let next = if lifted { Part::Lift } else { Part::Decision };
-        marks.push((slide.ended_ns, Mark::Spent(next)));
-    }
-    let touched = rig.touches().first().map(|touch| touch.began_ns);
-    let first = seen.first().map_or(0, |(at_ns, _)| *at_ns);
-    marks.extend(seen.iter().filter_map(|&(at_ns, seen)| {
-        let mark = match seen {
-            // later it is on between others
-            Seen::Lit if at_ns > first => return None,
-            Seen::Lit => Mark::Spent(Part::SelfCheck),
-            // the slide was taken in, and the person goes on
-            Seen::Press if touched.is_some_and(|touched| at_ns > touched) => {
-                Mark::Spent(Part::Lift)
+    for &(at_ns, seen) in seen {
+        match seen {
+            Seen::Press if touched_ns.is_none_or(|touched_ns| at_ns <= touched_ns) => {
+                times.ready(at_ns);
             }
-            Seen::Press => Mark::Ready,
-            Seen::Slide => Mark::Spent(Part::Reaction),
-            Seen::Over => Mark::Verdict,
-        };
-        Some((at_ns, mark))
-    }));
-    marks.sort_unstable();
-    let mut timeline = Timeline::new();
-    for (at_ns, mark) in marks {
-        match mark {
-            Mark::Ready => timeline.ready(at_ns),
-            Mark::Spent(part) if Some(at_ns) == touched => timeline.begin(at_ns, part),
-            Mark::Spent(part) => timeline.enter(at_ns, Some(part)),
-            Mark::Verdict => {
-                timeline.verdict(at_ns);
+            Seen::Over => {
+                times.verdict(at_ns);
                 break;
             }
+            _ => {}
         }
     }
-    timeline
+    times
 }
 
 /// What the firmware told its host meanwhile, against the world.

@@ -16,7 +16,7 @@ use crate::host::exploration::{self, ExploreError};
 use crate::host::learned::Chosen;
 use crate::host::progress;
 use crate::host::talk::Talk;
-use crate::host::timeline::{Part, Timeline};
+use crate::host::milestones::Milestones;
 use crate::host::under_finger::RECORDED_LIMITS;
 
 /// What is identified, and how.
@@ -44,16 +44,6 @@ pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
         eprintln!("{:10.3} s  {line}", at_ns as f64 * 1e-9);
     }
     Ok(())
-}
-
-/// Notes what time goes to.
-fn watch(timeline: &mut Timeline, board: &mut Emulator, report: Option<&Report>) {
-    let now_ns = board.now_ns();
-    let truth = board.rig().world().truth();
-    match report {
-        Some(report) => timeline.hear(now_ns, &report.event, &truth),
-        None => timeline.look(now_ns, &truth),
-    }
 }
 
 /// Has the firmware identify what lies under its finger, and shows it as it goes.
@@ -88,9 +78,11 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
 
     let bar = progress::spinner("");
     let now = |board: &Emulator| board.now_ns() as f64 * 1e-9;
-    let mut timeline = Timeline::new();
+    let mut times = Milestones::default();
     let fault = talk.ready(|board, report| {
-        watch(&mut timeline, board, report);
+        if let Some(report) = report {
+            times.hear(board.now_ns(), &report.event);
+        }
         let now = now(board);
         bar.set_message(format!("looking for the limit switches, {now:.1} s"));
         logged(board);
@@ -99,7 +91,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         bar.suspend(|| eprintln!("fault while homing: {fault}; homed again"));
     }
     bar.set_message("giving it the table");
-    timeline.ready(talk.now_ns());
+    times.ready(talk.now_ns());
     talk.teach(&known.calibration, &known.table, |board, _| logged(board))?;
 
     let identify = Identify {
@@ -119,14 +111,14 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let mut show = Show::new(table, &mut out);
     let mut failed = Ok(());
     let mut forces: Vec<f32> = Vec::new();
-    timeline.begin(talk.now_ns(), Part::Stage);
+    times.begin(talk.now_ns());
     let explored =
         exploration::explore(&mut talk, &known.table, identify, truth, |board, report| {
             logged(board);
-            watch(&mut timeline, board, report);
             let Some(Report { event, .. }) = report else {
                 return;
             };
+            times.hear(board.now_ns(), event);
             // not within `suspend`, which holds the bar
             if let Event::Live(live) = event {
                 forces.push(f32::from(live.force_mn) * 1e-3);
@@ -165,7 +157,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     if text {
         println!(
             "{}{:.1} s of the board's time in {wall_s:.1} s. Force {:.1} %, speed {:.2} % off at most; slots within {:.2} us.",
-            timeline.sentence("command"),
+            times.sentence("command"),
             explored.virtual_s,
             explored.force_error().1 * 100.0,
             explored.speed_error() * 100.0,
@@ -187,9 +179,8 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         line["elf_sha256"] = sha256.into();
         line["seed"] = world.seed.into();
         line["wall_seconds"] = wall_s.into();
-        line["seconds_to_ready"] = timeline.seconds_to_ready().into();
-        line["seconds_to_verdict"] = timeline.seconds_to_verdict().into();
-        line["timeline"] = timeline.json();
+        line["seconds_to_ready"] = times.seconds_to_ready().into();
+        line["seconds_to_verdict"] = times.seconds_to_verdict().into();
         println!("{line}");
     }
     std::io::stdout().flush()?;

@@ -30,9 +30,9 @@ use crate::host::progress;
 /// A virtual hour takes minutes on the PC rig and half an hour on the board, on an idle core each; what is left is shown.
 #[derive(Arguments)]
 #[command(after_help = "Examples:
-  cargo xtask soak                                     24 hours and one
-  cargo xtask soak --pc-hours 0 --board-hours 0.1      six minutes on the board only
-  cargo xtask soak --seed 7 --format json --out soak.json")]
+  cargo xtask campaign soak                                       24 hours and one
+  cargo xtask campaign soak -- --pc-hours 0 --board-hours 0.1     six minutes on the board only
+  cargo xtask campaign soak -- --seed 7 --format json --out soak.json")]
 pub(crate) struct Args {
     #[command(flatten)]
     firmware: Firmware,

@@ -77,8 +77,8 @@ fn a_board_without_the_probes_clock_runs_by_its_own() {
 fn a_start_up_that_hangs_is_ended_by_the_watchdog() {
     let Some(elf) = elf() else { return };
     let mut emulator = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
-    // where embassy waits for the PLL, without end
-    let (address, _) = emulator.symbol("rcc8__version8init_pll").unwrap();
+    // before the clocks are set up
+    let (address, _) = emulator.symbol("tactus_board_start").unwrap();
     emulator.write(address, &[0xFE, 0xE7]).unwrap();
     emulator.run_ms(3000).unwrap();
     let resets = emulator.resets().unwrap();

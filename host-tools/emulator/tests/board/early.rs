@@ -6,7 +6,7 @@ use std::path::Path;
 use tactus_core::explorer::Method;
 use tactus_core::wire::{Event, Identify, Phase};
 use tactus_emulator::host::exploration::{Exploration, explore};
-use tactus_emulator::host::timeline::{Part, Timeline};
+use tactus_emulator::host::milestones::Milestones;
 use tactus_emulator::host::under_finger::{self, Known};
 use tactus_lab::eval::learn::know_lengths;
 use tactus_lab::sim::collection::Collection;
@@ -48,8 +48,8 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
         .unwrap();
     talk.board().rig().world().reset_extremes();
     let (mut early, mut path, mut sliding, mut most_n) = (Vec::new(), (0.0, 0.0), false, 0.0_f64);
-    let mut timeline = Timeline::new();
-    timeline.begin(talk.now_ns(), Part::Stage);
+    let mut times = Milestones::default();
+    times.begin(talk.now_ns());
     let asked = Identify {
         seed: 11,
         ..Identify::default()
@@ -66,7 +66,7 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
                 path.1 = truth.stage_mm;
             }
             let Some(report) = report else { return };
-            timeline.hear(now_ns, &report.event, &truth);
+            times.hear(now_ns, &report.event);
             match report.event {
                 Event::Early(ms) => early.push(ms),
                 Event::Phase(phase) => {
@@ -84,7 +84,7 @@ fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
         early,
         way_mm: path.1 - path.0,
         most_n,
-        seconds_to_verdict: timeline.seconds_to_verdict().unwrap(),
+        seconds_to_verdict: times.seconds_to_verdict().unwrap(),
     }
 }
 
@@ -194,7 +194,7 @@ fn the_guard_trips_while_a_slide_is_ended() {
 }
 
 /// How much sooner a person knows, over 20 worlds: `cargo test --release --test board early:: -- --ignored --nocapture` in this folder, with
-/// the ELF of `cargo xtask build` in `TACTUS_ELF`.
+/// the ELF of `cargo xtask size` in `TACTUS_ELF`.
 #[test]
 #[ignore = "20 worlds take a quarter of an hour"]
 fn verdicts_come_sooner() {

@@ -64,7 +64,7 @@ fn break_code(board: &mut Emulator, name: &str, instead: Instead) -> (u64, Vec<u
             board.write(address, &branch(address, NOWHERE)).unwrap();
         }
         Instead::Panics => {
-            let (panic, _) = board.symbol("core9panicking5panic").unwrap();
+            let (panic, _) = board.symbol("rust_begin_unwind").unwrap();
             board.write(NOWHERE, &panicking(panic)).unwrap();
             board.write(address, &branch(address, NOWHERE)).unwrap();
         }
@@ -87,7 +87,7 @@ fn break_code(board: &mut Emulator, name: &str, instead: Instead) -> (u64, Vec<u
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Cause {
     Rig(Fault),
-    /// A function of the firmware, by its mangled name.
+    /// A function of the firmware, by the name that it exports.
     Code(&'static str, Instead),
     /// The debug probe's 8 MHz stop.
     Clock,
@@ -208,7 +208,7 @@ const CASES: [Case; 17] = [
     Case {
         // 2 s without a check-in
         name: "the tasks of thread mode hang",
-        cause: Cause::Code("___watch_task_inner_function0E4poll", Instead::Hangs),
+        cause: Cause::Code("tactus_check_in", Instead::Hangs),
         when: When::Pressing,
         // the task that would report it is the one that hangs: the report comes after the restart
         seen: &[],
@@ -217,21 +217,21 @@ const CASES: [Case; 17] = [
     Case {
         // the watchdog's 100 ms, by an oscillator of 32 kHz, then the firmware's start
         name: "the servo hangs",
-        cause: Cause::Code("___servo_task_inner_function0E4poll", Instead::Hangs),
+        cause: Cause::Code("tactus_servo_tick", Instead::Hangs),
         when: When::Sliding,
         seen: &[],
         deadline_ms: Some(500),
     },
     Case {
         name: "the servo crashes",
-        cause: Cause::Code("___servo_task_inner_function0E4poll", Instead::Crashes),
+        cause: Cause::Code("tactus_servo_tick", Instead::Crashes),
         when: When::Sliding,
         seen: &[],
         deadline_ms: Some(3),
     },
     Case {
         name: "a task panics",
-        cause: Cause::Code("___watch_task_inner_function0E4poll", Instead::Panics),
+        cause: Cause::Code("tactus_check_in", Instead::Panics),
         when: When::Sliding,
         seen: &[],
         // its task has its turn every 5 ms

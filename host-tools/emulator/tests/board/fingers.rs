@@ -1,6 +1,4 @@
-//! The images for other fingers than a BioTac: each starts its parts, identifies with them, and names what is wrong with them.
-
-use std::path::PathBuf;
+//! The rig's image with other fingers than a BioTac: it finds out which one is there, starts its parts, identifies with them, and names what is wrong with them.
 
 use tactus_core::explorer::Method;
 use tactus_core::rig::Fault;
@@ -11,29 +9,22 @@ use tactus_emulator::host::exploration::explore;
 use tactus_emulator::host::talk::Talk;
 use tactus_emulator::host::under_finger::{mounted_with, simulated_with};
 use tactus_lab::sim::collection::Collection;
+use tactus_world::faults::Fault as Broken;
 use tactus_world::parts::PartFault;
 use tactus_world::world::Setup;
 
-use crate::common::{elf_of, ready};
+use crate::common::{elf, ready};
 use crate::faults::identify;
 
-/// By now RAM has its initial values, and no slot has begun: the accelerometer starts for 10 ms.
-const BEFORE_SLOTS_MS: u64 = 5;
-/// The ADS1220's RDATA with the byte behind it, as a frame; and where a transaction of two frames has its own and the mode.
+/// By now RAM has its initial values, and no slot has begun: the finger is looked for after 100 ms.
+const BEFORE_SLOTS_MS: u64 = 50;
+/// The ADS1220's RDATA with the byte behind it, as a frame; and where a transaction has its frames and the mode.
 const RDATA: u16 = 0x1000;
 const FRAME_AT: u64 = 8;
-const MODE_AT: u64 = 15;
-const TRANSACTION_BYTES: u64 = 16;
+const MODE_AT: u64 = 17;
+const TRANSACTION_BYTES: u64 = 20;
 /// The finger must never feel more, N.
 const MOST_N: f64 = 2.2;
-
-fn elf(finger: FingerName) -> Option<PathBuf> {
-    elf_of(match finger {
-        FingerName::Biotac => "TACTUS_ELF",
-        FingerName::Analog => "TACTUS_ANALOG_ELF",
-        FingerName::Mems => "TACTUS_MEMS_ELF",
-    })
-}
 
 fn board(finger: FingerName) -> Option<Emulator> {
     let setup = Setup {
@@ -41,11 +32,11 @@ fn board(finger: FingerName) -> Option<Emulator> {
         finger,
         ..Setup::default()
     };
-    Some(Emulator::start(&elf(finger)?, setup, Options::default()).unwrap())
+    Some(Emulator::start(&elf()?, setup, Options::default()).unwrap())
 }
 
 fn boots_and_identifies(finger: FingerName) {
-    let Some(elf) = elf(finger) else { return };
+    let Some(elf) = elf() else { return };
     let world = Collection {
         seed: 1,
         textures: Collection::spread(60, 4),
@@ -101,26 +92,55 @@ fn told(talk: &mut Talk, until_s: f64) -> (Vec<Fault>, Vec<String>) {
     (faults, sentences)
 }
 
+/// Plugs everything in, and has the rig home once the probe has noticed: it starts again for another finger than a BioTac.
+fn works_again(talk: &mut Talk) {
+    talk.board().rig().world().clear();
+    let now_s = talk.now_ns() as f64 * 1e-9;
+    told(talk, now_s + 8.0);
+    // that it has started again is still on the line
+    let _ = talk.send(Command::Status, 1.0, |_, _| ());
+    talk.send(Command::Home, 60.0, |_, _| ()).unwrap();
+    assert!(talk.board().rig().world().truth().force_max_n < MOST_N);
+}
+
 #[test]
-fn a_part_that_is_not_there_is_named_until_it_is() {
-    for finger in [FingerName::Analog, FingerName::Mems] {
-        let Some(board) = board(finger) else { return };
-        board.rig().world().break_part(PartFault::Unplugged);
+fn a_finger_that_is_plugged_in_late_is_found() {
+    for finger in FingerName::ALL {
+        let Some(mut board) = board(finger) else {
+            return;
+        };
+        board.inject(Broken::SensorUnplugged);
         let mut talk = Talk::new(board);
         let (faults, sentences) = told(&mut talk, 1.5);
         eprintln!("{finger}: {faults:?}, {sentences:?}");
         assert_eq!(faults.first(), Some(&Fault::SensorSilent));
-        if finger == FingerName::Mems {
-            let named = |said: &String| said.contains("the IIS3DWB accelerometer answers FF to 8F");
-            assert!(sentences.iter().any(named), "{sentences:?}");
-        }
-        // it is plugged in
-        talk.board().rig().world().clear();
-        let now_s = talk.now_ns() as f64 * 1e-9;
-        told(&mut talk, now_s + 1.0);
-        talk.send(Command::Home, 60.0, |_, _| ()).unwrap();
-        assert!(talk.board().rig().world().truth().force_max_n < MOST_N);
+        let named = |said: &String| said.contains("no finger answers");
+        assert!(sentences.iter().any(named), "{sentences:?}");
+        works_again(&mut talk);
+        let resets = talk.board().resets().unwrap().len();
+        assert_eq!(
+            resets,
+            usize::from(finger != FingerName::Biotac),
+            "{finger}"
+        );
     }
+}
+
+#[test]
+fn a_part_that_is_not_there_is_named_until_it_is() {
+    let Some(board) = board(FingerName::Mems) else {
+        return;
+    };
+    let fault = PartFault::AccelerometerUnplugged;
+    board.rig().world().break_part(fault);
+    let mut talk = Talk::new(board);
+    let (faults, sentences) = told(&mut talk, 1.5);
+    eprintln!("{faults:?}, {sentences:?}");
+    assert_eq!(faults.first(), Some(&Fault::SensorSilent));
+    let named = |said: &String| said.contains("the IIS3DWB accelerometer answers FF to 8F");
+    assert!(sentences.iter().any(named), "{sentences:?}");
+    works_again(&mut talk);
+    assert_eq!(talk.board().resets().unwrap(), []);
 }
 
 #[test]

@@ -623,7 +623,7 @@ fn the_force_is_set_on_its_own_screen() {
 /// A finger with an accelerometer is turned over: no computer, and then one.
 #[test]
 fn a_finger_is_turned_over_on_its_own_screen_and_for_a_host() {
-    let Some(elf) = elf_of("TACTUS_HANDHELD_MEMS_ELF") else {
+    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
         return;
     };
     let setup = Setup {

@@ -22,7 +22,6 @@ mod long_table;
 mod motion;
 mod old_store;
 mod referee;
-mod scope;
 mod selftest;
 mod serve;
 mod settings;

@@ -25,7 +25,7 @@ use crate::handheld_link::{Held, shows};
 const LONG_S: f64 = 120.0;
 
 fn elf() -> Option<PathBuf> {
-    elf_of("TACTUS_MOTION_ELF")
+    elf_of("TACTUS_HANDHELD_ELF")
 }
 
 /// A hand that holds its pace and the probe level.

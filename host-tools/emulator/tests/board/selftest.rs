@@ -1,6 +1,6 @@
 //! The board's self-test on boards that are intact, and on boards that are not.
 //!
-//! TACTUS_SELFTEST_ELF names the ELF, which `cargo xtask build` makes; without it there is nothing to run.
+//! TACTUS_SELFTEST_ELF names the ELF, which `cargo xtask size` makes; without it there is nothing to run.
 
 use tactus_emulator::board::{Emulator, Options, Output, ResetCause};
 use tactus_world::encoder::Cut;

@@ -237,7 +237,7 @@ fn a_stack_that_overflows_is_stopped_at_its_guard() {
                 planted = true;
                 // push {r0-r7}, and again
                 board.write(NOWHERE, &[0xFF, 0xB4, 0xFD, 0xE7]).unwrap();
-                let (task, _) = board.symbol("___watch_task_inner_function0E4poll").unwrap();
+                let (task, _) = board.symbol("tactus_check_in").unwrap();
                 let task = task & !1;
                 let whole = board.read(task, 8).unwrap();
                 // ldr.w pc, [pc], and the address behind; nop first, where it would not be a multiple of 4
@@ -280,9 +280,9 @@ fn runs_at(elf: &Path, task: &str) -> u64 {
 #[test]
 fn a_task_that_does_not_start_stops_the_boot() {
     for (variable, task) in [
-        ("TACTUS_ELF", "5servo5servo4POOL"),
-        ("TACTUS_ELF", "5probe5probe4POOL"),
-        ("TACTUS_HANDHELD_ELF", "4hand4hand4POOL"),
+        ("TACTUS_ELF", "::servo::servo::POOL"),
+        ("TACTUS_ELF", "::probe::probe::POOL"),
+        ("TACTUS_HANDHELD_ELF", "::hand::hand::POOL"),
     ] {
         let Some(elf) = elf_of(variable) else { return };
         let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();

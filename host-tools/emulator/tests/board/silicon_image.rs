@@ -11,8 +11,8 @@ use tactus_world::world::Setup;
 
 use crate::common::elf_of;
 
-/// How far a kernel's cycles by the image may be off the model's: a compiler's next version changes them.
-const OFF: f64 = 0.05;
+/// How far a kernel's cycles by the image may be off the model's: compilers differ. The image itself allows 30 %.
+const OFF: f64 = 0.2;
 
 /// Runs the image to its end; `each` sees its lines.
 fn run(board: &mut Emulator, mut each: impl FnMut(&mut Emulator, &str)) -> Vec<String> {

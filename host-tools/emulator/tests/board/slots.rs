@@ -11,12 +11,12 @@ use tactus_world::world::Setup;
 use crate::common::{elf, elf_of, ready};
 use crate::faults::identify;
 
-/// A transaction as the firmware keeps it in RAM: its time, the gap behind it, the frame, the select, how many bytes.
+/// A transaction as the firmware keeps it in RAM: its time, the gap behind it, three frames, the select, how many bytes.
 const GAP_AT: u64 = 4;
 const FRAME_AT: u64 = 8;
-const SELECT_AT: u64 = 10;
-const BYTES_AT: u64 = 11;
-const TRANSACTION_BYTES: u64 = 16;
+const SELECT_AT: u64 = 14;
+const BYTES_AT: u64 = 15;
+const TRANSACTION_BYTES: u64 = 20;
 /// Ticks of the slots' timer in a us, and the gap behind a command, us.
 const TICKS: u32 = 84;
 const GAP_US: u32 = 50;

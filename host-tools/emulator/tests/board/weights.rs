@@ -26,7 +26,7 @@ fn mems() -> Option<Talk> {
         finger: FingerName::Mems,
         ..Setup::default()
     };
-    let elf = elf_of("TACTUS_MEMS_ELF")?;
+    let elf = elf_of("TACTUS_ELF")?;
     let mut talk = Talk::new(Emulator::start(&elf, setup, Options::default()).unwrap());
     ready(&mut talk);
     Some(talk)

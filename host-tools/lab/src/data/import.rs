@@ -32,8 +32,6 @@ use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result};
 use crate::data::rows::Rows;
 
-#[cfg(feature = "cluster")]
-pub mod cluster;
 pub mod signs;
 
 /// Sliding speed of the publisher's arm.
@@ -54,8 +52,6 @@ pub struct Imported {
     pub slides: usize,
     /// Rows of 10 ms that the publisher's files lack, by their timestamps: the samples before and after are joined.
     pub lost_rows: usize,
-    /// Slides in which the sensor paused: they are not imported.
-    pub left_out: usize,
 }
 
 /// Converts the recordings in the folder `from` to the project's own format in the folder `to`, where an import that was

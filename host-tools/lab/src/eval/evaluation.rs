@@ -1,13 +1,12 @@
 //! Figures of virtual explorations, with and without what a user would have been told: what `tactus evaluate` prints.
 
 use serde::Serialize;
-use tactus_core::explorer::{Config, SlideTime};
+use tactus_core::explorer::Config;
 
 use crate::eval::courses::courses;
 use crate::eval::evaluate::{EvaluateError, Method, Outcome, Summary, evaluate};
 use crate::eval::experiment::Experiment;
 use crate::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
-use crate::eval::seconds::mean_seconds;
 use crate::eval::verdicts::Verdicts;
 
 pub use crate::eval::courses::Course;
@@ -35,9 +34,6 @@ pub struct Evaluation {
     pub verdicts: Verdicts,
     /// Mean number of slides until then.
     pub mean_slides_told: f64,
-    /// Mean time until then, s, where that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_seconds_told: Option<f64>,
     /// How often it was right when it said so, by what it said.
     pub reliability: Vec<Statements>,
     /// What another threshold would change.
@@ -61,8 +57,6 @@ pub struct Asked {
     pub seed: u64,
     /// How runs end, and choose.
     pub config: Config,
-    /// How long slides take, if the mean time is wanted.
-    pub time: Option<SlideTime>,
     /// Whether reliability and other thresholds are wanted: a third of the work.
     pub with_courses: bool,
 }
@@ -106,7 +100,7 @@ pub fn evaluation(
             Ok(())
         })?;
     }
-    let (names, movements) = (experiment.names(), experiment.movements());
+    let names = experiment.names();
     let evaluation = Evaluation {
         reliability: statements(&all, config.threshold),
         by_threshold: by_threshold(&all, config.threshold),
@@ -120,7 +114,6 @@ pub fn evaluation(
         seed: asked.seed,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
         mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
-        mean_seconds_told: asked.time.map(|time| mean_seconds(&told, movements, time)),
         summary,
     };
     Ok((evaluation, all))

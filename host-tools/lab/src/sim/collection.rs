@@ -529,7 +529,7 @@ mod tests {
     use super::*;
 
     /// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this simulator. All of
-    /// each is compared by `cargo xtask factory --check`.
+    /// each is compared by `cargo xtask campaign factory`.
     #[test]
     fn factory_tables_are_of_this_world() {
         // the image of this one ends slides early
@@ -566,7 +566,7 @@ mod tests {
                         assert!(
                             (mean - f64::from(known)).abs() <= 2.0,
                             "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if simulator or features \
-                             were changed on purpose: cargo xtask factory"
+                             were changed on purpose: cargo xtask campaign factory -- --write"
                         );
                     }
                 }

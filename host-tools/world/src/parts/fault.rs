@@ -13,6 +13,8 @@ pub enum PartFault {
     CellReversed,
     /// The plug of all parts is out.
     Unplugged,
+    /// That of the accelerometer is.
+    AccelerometerUnplugged,
     /// Something blocks the cell: it says the same, pressed or not.
     CellBlocked,
     /// The clocks of accelerometer and converter are off by this share.

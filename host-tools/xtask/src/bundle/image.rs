@@ -6,7 +6,7 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader as _};
 use object::{Endianness, elf};
 
-/// Where the chip's flash begins, and how much of it an image has (board.x).
+/// Where the chip's flash begins, and how much of it an image has (memory.x).
 const FLASH: u32 = 0x0800_0000;
 const FLASH_LENGTH: usize = 1024 << 10;
 

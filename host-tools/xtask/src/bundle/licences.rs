@@ -1,112 +1,163 @@
-//! The licences of what a release is linked with, in their authors' words.
-use std::collections::BTreeMap;
+//! The licences of the crates that a release is linked with, in their authors' words.
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
-use serde_json::Value;
+use anyhow::{Context as _, Result, ensure};
 
-/// What the names of files begin with that are licences.
-const NAMES: [&str; 6] = [
-    "LICENSE",
-    "LICENCE",
-    "COPYING",
-    "COPYRIGHT",
-    "NOTICE",
-    "UNLICENSE",
-];
+use crate::shell::{cargo, root};
+use crate::toolchain;
 
-/// One text for all packages, as cargo's metadata has them: who allows what, then each licence once.
-pub(super) fn of<'m>(packages: impl Iterator<Item = &'m Value>) -> Result<String> {
-    let mut list = String::new();
-    let mut texts: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for package in packages {
-        let said = |key: &str| package[key].as_str().unwrap_or("not said");
-        let name = format!("{} {}", said("name"), said("version"));
-        let manifest = package["manifest_path"].as_str().map(Path::new);
-        let folder = manifest.and_then(Path::parent);
-        let files = licences_in(folder.with_context(|| format!("{name} is nowhere"))?)?;
+/// Beginnings of the names of files that are licences.
+const NAMES: [&str; 5] = ["LICEN", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE"];
+
+/// One text for all parts, each a manifest, a package and a platform: a list of crates, then each licence once.
+pub(super) fn of(parts: &[(&str, &str, Option<&str>)]) -> Result<String> {
+    let (mut crates, mut host) = (BTreeSet::new(), String::new());
+    if parts.iter().any(|(.., triple)| triple.is_none()) {
+        host = toolchain::host()?;
+    }
+    for (manifest, package, triple) in parts {
+        let mut tree = cargo();
+        // what only runs in the compiler is not linked
+        tree.args([
+            "tree",
+            "--locked",
+            "--edges",
+            "normal,no-proc-macro",
+            "--prefix",
+            "none",
+        ]);
+        tree.args([
+            "--format",
+            "{p}|{l}",
+            "--package",
+            package,
+            "--target",
+            triple.unwrap_or(&host),
+        ]);
+        let out = tree
+            .arg("--manifest-path")
+            .arg(root().join(manifest))
+            .output()?;
+        ensure!(
+            out.status.success(),
+            "cargo tree: {}",
+            String::from_utf8_lossy(&out.stderr)
+        );
+        let text = String::from_utf8(out.stdout)?;
+        // ours have a folder behind their version
+        let others = text.lines().filter(|line| !line.contains(" ("));
+        crates.extend(others.map(str::to_owned));
+    }
+    let mut found = Vec::new();
+    for line in &crates {
+        let (name, licence) = line.split_once('|').unwrap_or((line, "not said"));
+        let name = name.replacen(" v", "-", 1);
+        let texts = licences_in(&folder(&name).with_context(|| format!("{name} is nowhere"))?)?;
+        found.push((name, licence.to_owned(), texts));
+    }
+    Ok(listed(&found))
+}
+
+/// The folder of a crate's source.
+fn folder(name: &str) -> Option<PathBuf> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(Path::new(&std::env::var_os("HOME")?).join(".cargo")))?;
+    let mut registries = std::fs::read_dir(home.join("registry/src")).ok()?.flatten();
+    registries.find_map(|registry| Some(registry.path().join(name)).filter(|path| path.is_dir()))
+}
+
+/// The text about these crates, each with its licence and the files of its licences.
+fn listed(crates: &[(String, String, Vec<String>)]) -> String {
+    let mut all = String::from(
+        "The crates that the files of this release are linked with, and their licences.\n\
+         Rust's standard library, MIT OR Apache-2.0, is in each of them. Where a crate has no text,\n\
+         MIT and Apache-2.0 read as in LICENSE-MIT and LICENSE-APACHE, with its authors in place of ours.\n\n",
+    );
+    let mut texts: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for (name, licence, files) in crates {
         let without = if files.is_empty() {
-            ", no text in its package"
+            ", no text in its crate"
         } else {
             ""
         };
-        writeln!(list, "{name}: {}{without}", said("license"))?;
+        // writing to a String cannot fail
+        let _ = writeln!(all, "{name}: {licence}{without}");
         for text in files {
-            let of_it = texts.entry(text).or_default();
-            // a package may have one text under two names
-            if of_it.last() != Some(&name) {
-                of_it.push(name.clone());
-            }
+            texts.entry(text).or_default().push(name);
         }
     }
-    let mut all = format!(
-        "What the files of this release are linked with, and on which terms; Rust's standard library, MIT OR Apache-2.0, is in each of them.\n\
-         Where a package has no text, MIT and Apache-2.0 read as in LICENSE-MIT and LICENSE-APACHE, with its authors in place of ours.\n\n{list}"
-    );
     for (text, names) in texts {
         let line = "-".repeat(80);
-        write!(
+        let _ = write!(
             all,
             "\n{line}\n{}\n{line}\n\n{}\n",
             names.join(", "),
             text.trim_end()
-        )?;
+        );
     }
-    Ok(all)
+    all
 }
 
-/// The texts of the licences in a package, in the order of their files' names.
+/// The texts of the licences in a folder, each once.
 fn licences_in(folder: &Path) -> Result<Vec<String>> {
-    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-    let mut files = Vec::new();
-    for entry in entries {
+    let mut texts = BTreeSet::new();
+    for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
         let file = entry?.path();
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let name = name.to_uppercase();
+        let name = file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_uppercase();
         if NAMES.iter().any(|begin| name.starts_with(begin)) && file.is_file() {
-            files.push(file);
+            let bytes = std::fs::read(&file).with_context(|| file.display().to_string())?;
+            texts.insert(String::from_utf8_lossy(&bytes).replace("\r\n", "\n"));
         }
     }
-    files.sort();
-    let read = |file: &std::path::PathBuf| {
-        let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
-        Ok(String::from_utf8_lossy(&bytes).replace("\r\n", "\n"))
-    };
-    files.iter().map(read).collect()
+    Ok(texts.into_iter().collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn each_licence_is_there_once_with_those_who_have_it() {
         let folder = tempfile::tempdir().unwrap();
-        let package = |name: &str, files: &[(&str, &str)]| {
-            let at = folder.path().join(name);
-            std::fs::create_dir(&at).unwrap();
-            for (file, text) in files {
-                std::fs::write(at.join(file), text).unwrap();
-            }
-            json!({"name": name, "version": "1.0.0", "license": "MIT", "manifest_path": at.join("Cargo.toml")})
-        };
-        let packages = [
-            package("one", &[("LICENSE-MIT", "may\r\nbe used"), ("README", "x")]),
-            package(
-                "two",
-                &[("license.txt", "may\nbe used"), ("NOTICE", "by two")],
-            ),
-            package("three", &[]),
-        ];
-        let text = of(packages.iter()).unwrap();
+        for (file, text) in [
+            ("LICENSE-MIT", "may\r\nbe used"),
+            ("license.txt", "may\nbe used"),
+            ("README", "x"),
+            ("NOTICE", "by me"),
+        ] {
+            std::fs::write(folder.path().join(file), text).unwrap();
+        }
+        let texts = licences_in(folder.path()).unwrap();
+        assert_eq!(texts, ["by me", "may\nbe used"]);
+        let of = |name: &str, texts: &[String]| (name.to_owned(), "MIT".to_owned(), texts.to_vec());
+        let text = listed(&[
+            of("one-1.0.0", &texts[1..]),
+            of("two-1.0.0", &texts),
+            of("three-1.0.0", &[]),
+        ]);
         assert_eq!(text.matches("may\nbe used").count(), 1, "{text}");
-        assert!(text.contains("one 1.0.0, two 1.0.0\n"), "{text}");
-        assert!(text.contains("\ntwo 1.0.0\n----"), "{text}");
+        for part in [
+            "\none-1.0.0, two-1.0.0\n---",
+            "\ntwo-1.0.0\n---",
+            "three-1.0.0: MIT, no text in its crate\n",
+        ] {
+            assert!(text.contains(part), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_images_are_linked_with_embassy_and_no_macro() {
+        let text = of(&[super::super::FIRMWARE]).unwrap();
         assert!(
-            text.contains("three 1.0.0: MIT, no text in its package\n"),
-            "{text}"
+            text.contains("\nembassy-stm32-") && !text.contains("\nsyn-"),
+            "{}",
+            &text[..2000]
         );
     }
 }

@@ -1,7 +1,8 @@
 //! The page with the simulated probe: one file of HTML, with its script, its style and the WebAssembly module in it.
 //!
-//! One file, since a browser loads neither modules nor WebAssembly from beside a page that was opened from a folder. For the same
-//! reason its scripts are plain ones; a content-security policy allows these by their hashes, and nothing else.
+//! One file, since a browser loads neither modules nor WebAssembly from beside a page that was opened from a folder.
+//! For the same reason its scripts are plain ones; a content-security policy allows these by their hashes, and nothing
+//! else.
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
@@ -9,7 +10,6 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use sha2::{Digest as _, Sha256};
 
-use crate::anywhere;
 use crate::shell::{root, run, target};
 use crate::toolchain::{self, BROWSER};
 
@@ -27,18 +27,11 @@ pub(crate) struct Built {
     pub(crate) wasm_bytes: usize,
 }
 
-impl Built {
-    pub(super) fn folder(&self) -> Result<&Path> {
-        self.page.parent().context("the page has no folder")
-    }
-}
-
 /// Builds the page.
 pub(crate) fn build() -> Result<Built> {
     let toolchain = toolchain::get(BROWSER)?;
     eprintln!("Building with {}", toolchain.version());
-    let mut cargo = toolchain.cargo_build(BROWSER, &[]);
-    anywhere::same(&mut cargo)?;
+    let mut cargo = toolchain.cargo_build(BROWSER);
     cargo.arg("--release").arg("--manifest-path");
     run(cargo.arg(root().join(CRATE).join("Cargo.toml"))).context("the page does not build")?;
     let release = toolchain
@@ -104,7 +97,8 @@ fn assemble(folder: &Path, module: &[u8], trials: &[u8]) -> Result<String> {
     let [scripts, styles] = hashes;
     // no connection, no form, no frame: what is done here stays here
     let csp = format!(
-        "default-src 'none'; script-src 'wasm-unsafe-eval'{scripts}; style-src{styles}; img-src data:; base-uri 'none'; form-action 'none'"
+        "default-src 'none'; script-src 'wasm-unsafe-eval'{scripts}; style-src{styles}; img-src data:; \
+         base-uri 'none'; form-action 'none'"
     );
     for (mark, text) in [
         ("{{csp}}", csp),
@@ -132,7 +126,8 @@ mod tests {
         folder
     }
 
-    const HTML: &str = "<meta content=\"{{csp}}\"><link rel=\"stylesheet\" href=\"a.css\"><p id=w>{{wasm}}</p><p id=t>{{trials}}</p><script src=\"a.js\"></script>";
+    const HTML: &str = "<meta content=\"{{csp}}\"><link rel=\"stylesheet\" href=\"a.css\">\
+        <p id=w>{{wasm}}</p><p id=t>{{trials}}</p><script src=\"a.js\"></script>";
 
     #[test]
     fn all_that_a_page_names_is_in_it_and_allowed_by_its_hash() {

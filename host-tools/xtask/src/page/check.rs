@@ -20,8 +20,8 @@ const STARTING: Duration = Duration::from_secs(600);
 const RECORDINGS: &str = "host-tools/recordings/simulated";
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
-/// Builds the page and tries it; skipped where there is no toolchain for it, no Chromium or no Node.js. The screenshots that it takes
-/// are left in `target/page`.
+/// Builds the page and tries it; skipped where there is no toolchain for it, no Chromium or no Node.js. The screenshots
+/// that it takes are left in `target/page`.
 pub(crate) fn check() -> Result<()> {
     let browser = match browser() {
         Ok(browser) => browser,
@@ -37,15 +37,22 @@ pub(crate) fn check() -> Result<()> {
         return skip(WHAT, &format!("{why:#}"));
     }
     let built = build()?;
-    println!("== formatting of the page");
-    let manifest = root().join(CRATE).join("Cargo.toml");
-    run(cargo()
-        .args(["fmt", "--check", "--manifest-path"])
-        .arg(manifest))?;
     println!("== {} bytes of WebAssembly", built.wasm_bytes);
-    let native = reference()?;
+    // requests with their replies here, a line each; and files for the page, as the command writes them
+    let native = left_by(
+        "core_and_lab",
+        "page::replies",
+        "TACTUS_PAGE_REPLIES",
+        "page-native.jsonl",
+    )?;
+    let files = left_by(
+        "command",
+        "opened::leaves_files_for_a_page",
+        "TACTUS_PAGE_FILES",
+        "page-files",
+    )?;
     let probe = Probe::in_software()?;
-    let (files, recordings) = (files()?, root().join(RECORDINGS));
+    let recordings = root().join(RECORDINGS);
     let (page, wasm) = (&built.page, &built.wasm);
     let arguments = [page, wasm, &native, &files, &recordings].map(|path| path.as_os_str());
     let mut tests = in_browser(browser, &arguments, &probe.address);
@@ -53,7 +60,7 @@ pub(crate) fn check() -> Result<()> {
 }
 
 /// Tries what the page does with a probe, with the emulated board in place of the one in software.
-pub(super) fn emulated() -> Result<()> {
+pub(crate) fn emulated() -> Result<()> {
     let browser = browser()?;
     let built = build()?;
     let probe = Probe::emulated()?;
@@ -83,7 +90,7 @@ fn starts(program: &&str) -> bool {
 }
 
 /// A Chromium of this machine.
-pub(super) fn browser() -> Result<&'static str> {
+fn browser() -> Result<&'static str> {
     let browser = BROWSERS.into_iter().find(starts);
     browser.context("no Chromium (apt-get install chromium)")
 }
@@ -135,8 +142,7 @@ impl Probe {
     /// The firmware on the emulated board.
     fn emulated() -> Result<Self> {
         run(&mut emulate::build())?;
-        let image = firmware::image_for(emulate::RIG, None)?;
-        let elf = firmware::compile(&[&image])?.remove(0);
+        let elf = firmware::compile(&[emulate::RIG])?.remove(0);
         let mut serves = emulate::program("serve");
         serves.args(["--port", "0", "--texture", "burlap", "--elf"]);
         let mut child = serves.arg(elf).stdout(Stdio::piped()).spawn()?;
@@ -162,30 +168,19 @@ impl Probe {
     }
 }
 
-/// What the same requests give here: the file, with a request and its reply a line.
-fn reference() -> Result<PathBuf> {
-    let file = target().join("page-native.jsonl");
-    // as the step of the tests has built it
-    let mut native = cargo();
-    native.args([
+/// Runs a test that leaves something for the page, as the step of the tests has built it: the path of that.
+fn left_by(binary: &str, test: &str, variable: &str, name: &str) -> Result<PathBuf> {
+    let path = target().join(name);
+    let mut tests = cargo();
+    tests.args([
         "test",
         "--workspace",
         "--test",
-        "core_and_lab",
+        binary,
         "--",
-        "page::replies",
+        test,
+        "--exact",
     ]);
-    run(native.env("TACTUS_PAGE_REPLIES", &file))?;
-    Ok(file)
-}
-
-/// What can be dropped on the page, as the command writes it: the folder.
-fn files() -> Result<PathBuf> {
-    let folder = target().join("page-files");
-    // as the step of the tests has built it
-    let mut writes = cargo();
-    writes.args(["test", "--workspace", "--test", "command", "--"]);
-    writes.args(["opened::leaves_files_for_a_page", "--exact"]);
-    run(writes.env("TACTUS_PAGE_FILES", &folder))?;
-    Ok(folder)
+    run(tests.env(variable, &path))?;
+    Ok(path)
 }

@@ -1,4 +1,6 @@
-//! What an image's symbols say: the biggest of them, the functions that panic, and who calls those.
+//! The biggest symbols of an image, and the calls of functions that panic, by their places in the source.
+use std::collections::BTreeSet;
+
 use anyhow::Result;
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 
@@ -31,10 +33,64 @@ pub(super) fn symbols(elf: &[u8]) -> Result<Vec<Symbol>> {
     Ok(symbols)
 }
 
-/// A function that panics, and those that call it.
-pub(super) struct Panics {
-    pub(super) name: String,
-    pub(super) callers: Vec<String>,
+/// What a call of a function that panics comes from.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) enum Kind {
+    /// A check in a dependency.
+    Dependency,
+    /// The body of an async function, which panics when it is polled after its end: no executor does that.
+    Resumed,
+    /// Several checks of one function that the compiler has made one: it does not say which.
+    Merged,
+    /// A check in the core or in the firmware.
+    Ours,
+}
+
+impl Kind {
+    pub(super) const ALL: [(Self, &str); 4] = [
+        (Self::Dependency, "checks in dependencies"),
+        (Self::Resumed, "async functions, polled after their end"),
+        (Self::Merged, "checks that the compiler has merged"),
+        (Self::Ours, "checks of our own"),
+    ];
+
+    /// The kind of a call, by its place in the source: what was inlined last comes first.
+    fn of(frames: &[Frame]) -> Self {
+        let is_ours = |file: &str| file.contains("shared/src") || file.contains("firmware/src");
+        let is_library = |file: &str| file.contains("/library/") || file.contains("/rustc/");
+        let Some(at) = frames.iter().position(|frame| !is_library(&frame.file)) else {
+            return Self::Dependency;
+        };
+        let frame = &frames[at];
+        if !is_ours(&frame.file) {
+            return Self::Dependency;
+        }
+        let last = frame.function.rsplit("::").next().unwrap_or_default();
+        if at == 0 && last.trim_start_matches('{').starts_with("closure") {
+            Self::Resumed
+        } else if frame.line == 0 {
+            Self::Merged
+        } else {
+            Self::Ours
+        }
+    }
+}
+
+/// A function that the debug information has at an address, and the place in it.
+#[derive(Debug)]
+struct Frame {
+    function: String,
+    file: String,
+    line: u32,
+}
+
+/// A call of a function that panics.
+#[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) struct Panic {
+    pub(super) kind: Kind,
+    /// The place in the source outside the standard library.
+    pub(super) place: String,
+    pub(super) function: String,
 }
 
 /// Parts of the names of functions that do nothing but panic.
@@ -54,8 +110,8 @@ const PANICKING: [&str; 13] = [
     "_defmt_panic",
 ];
 
-/// Functions that panic, and who calls them, by the calls and jumps in the code.
-pub(super) fn panics(elf: &[u8]) -> Result<Vec<Panics>> {
+/// Calls of functions that panic, by the calls and jumps in the code.
+pub(super) fn panics(elf: &[u8]) -> Result<Vec<Panic>> {
     let file = object::File::parse(elf)?;
     let mut functions = Vec::new();
     for symbol in file.symbols() {
@@ -65,72 +121,79 @@ pub(super) fn panics(elf: &[u8]) -> Result<Vec<Panics>> {
         }
     }
     functions.sort();
-    let calls: Vec<Vec<u64>> = functions
-        .iter()
-        .map(|(address, size, _)| {
-            let code = file
-                .sections()
-                .find_map(|section| section.data_range(*address, *size).ok().flatten());
-            targets(*address, code.unwrap_or_default()).collect()
-        })
-        .collect();
-    Ok(callers(&functions, &calls))
-}
-
-/// Parts of the names of functions that panic for whoever calls them: what the compiler puts into a function of its own
-/// because many end with it, and indexing.
-const WAYS: [&str; 4] = [
-    "OUTLINED_FUNCTION",
-    "core::slice::copy_from_slice_impl",
-    "as core::ops::index::Index",
-    "core::slice::index::",
-];
-
-/// The functions that panic, and who calls them: functions by address, size and name, and where the calls of each go.
-fn callers(functions: &[(u64, u64, String)], calls: &[Vec<u64>]) -> Vec<Panics> {
+    functions.dedup_by_key(|(address, ..)| *address);
     let does = |name: &str| PANICKING.iter().any(|part| name.contains(part));
-    let is_way = |name: &str| WAYS.iter().any(|part| name.contains(part));
-    let mut panics: std::collections::BTreeMap<u64, Panics> = functions
-        .iter()
-        .filter(|(_, _, name)| does(name))
-        .map(|(address, _, name)| {
-            let panics = Panics {
-                name: name.clone(),
-                callers: Vec::new(),
-            };
-            (*address, panics)
+    let panicking: BTreeSet<u64> = file
+        .symbols()
+        .filter(|symbol| {
+            let name = symbol.name().unwrap_or_default();
+            does(&format!("{:#}", rustc_demangle::demangle(name)))
         })
+        .map(|symbol| symbol.address() & !1)
         .collect();
-    // what ends in a panic is its way, not its reason: one that panics for another, and what was outlined
-    let mut ways: std::collections::BTreeMap<u64, u64> =
-        panics.keys().map(|address| (*address, *address)).collect();
-    let mut known = 0;
-    while known < ways.len() {
-        known = ways.len();
-        for ((address, _, name), targets) in functions.iter().zip(calls) {
-            if is_way(name)
-                && let Some(end) = targets.iter().find_map(|target| ways.get(target))
-            {
-                ways.insert(*address, *end);
-            }
+    let lines = Lines::of(&file)?;
+    let mut found = BTreeSet::new();
+    for (address, size, name) in &functions {
+        let code = file
+            .sections()
+            .find_map(|section| section.data_range(*address, *size).ok().flatten());
+        if panicking.contains(address) {
+            continue;
+        }
+        let calls = targets(*address, code.unwrap_or_default());
+        for (at, _) in calls.filter(|(_, target)| panicking.contains(target)) {
+            let frames = lines.at(at)?;
+            let outside = |frame: &&Frame| !frame.file.contains("/library/");
+            let place = frames.iter().find(outside);
+            let place = place.map(|frame| format!("{}:{}", frame.file, frame.line));
+            found.insert(Panic {
+                kind: Kind::of(&frames),
+                place: place.unwrap_or_default(),
+                function: name.clone(),
+            });
         }
     }
-    for ((_, _, name), targets) in functions.iter().zip(calls) {
-        for target in targets {
-            if !does(name)
-                && !is_way(name)
-                && let Some(panics) = ways.get(target).and_then(|end| panics.get_mut(end))
-                && !panics.callers.contains(name)
-            {
-                panics.callers.push(name.clone());
-            }
-        }
-    }
-    panics.into_values().collect()
+    Ok(found.into_iter().collect())
 }
 
-/// Where the long calls and jumps (BL and B.W) of code at an address go.
-fn targets(address: u64, code: &[u8]) -> impl Iterator<Item = u64> + '_ {
+type Reader<'e> = addr2line::gimli::EndianSlice<'e, addr2line::gimli::LittleEndian>;
+
+/// The debug information of an image.
+struct Lines<'e>(addr2line::Context<Reader<'e>>);
+
+impl<'e> Lines<'e> {
+    fn of(file: &object::File<'e>) -> Result<Self> {
+        let section = |id: addr2line::gimli::SectionId| {
+            let section = file.section_by_name(id.name());
+            let bytes = section.map_or(Ok(&[][..]), |section| section.data());
+            bytes.map(|bytes| Reader::new(bytes, addr2line::gimli::LittleEndian))
+        };
+        let dwarf = addr2line::gimli::Dwarf::load(section)?;
+        Ok(Self(addr2line::Context::from_dwarf(dwarf)?))
+    }
+
+    /// The functions at an address, the innermost first.
+    fn at(&self, address: u64) -> Result<Vec<Frame>> {
+        let mut frames = self.0.find_frames(address).skip_all_loads()?;
+        let mut found = Vec::new();
+        while let Some(frame) = frames.next()? {
+            let function = match &frame.function {
+                Some(function) => function.raw_name()?.into_owned(),
+                None => String::new(),
+            };
+            let location = frame.location.as_ref();
+            found.push(Frame {
+                function: format!("{:#}", rustc_demangle::demangle(&function)),
+                file: location.and_then(|l| l.file).unwrap_or("?").to_owned(),
+                line: location.and_then(|l| l.line).unwrap_or(0),
+            });
+        }
+        Ok(found)
+    }
+}
+
+/// The long calls and jumps (BL and B.W) of code at an address: where they are, and where they go.
+fn targets(address: u64, code: &[u8]) -> impl Iterator<Item = (u64, u64)> + '_ {
     let (halves, _) = code.as_chunks();
     let halves: Vec<u32> = halves
         .iter()
@@ -153,7 +216,8 @@ fn targets(address: u64, code: &[u8]) -> impl Iterator<Item = u64> + '_ {
                 let high = (sign ^ j1 ^ 1) << 23 | (sign ^ j2 ^ 1) << 22;
                 let offset = high | (first & 0x3ff) << 12 | (second & 0x7ff) << 1;
                 let offset = offset | if sign == 1 { 0xff00_0000 } else { 0 };
-                return Some((here + 4).wrapping_add_signed(i64::from(offset as i32)));
+                let target = (here + 4).wrapping_add_signed(i64::from(offset as i32));
+                return Some((here, target));
             }
         }
         None
@@ -171,37 +235,49 @@ mod tests {
             0xbf00u16, 0xf000, 0xf804, 0xf7ff, 0xfffe, 0xf000, 0xb802, 0xe7fe,
         ];
         let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
-        let found: Vec<u64> = targets(0x0800_0000, &bytes).collect();
+        let found: Vec<u64> = targets(0x0800_0000, &bytes).map(|(_, to)| to).collect();
         assert_eq!(found, [0x0800_000e, 0x0800_0006, 0x0800_0012]);
     }
 
     #[test]
-    fn a_panic_is_its_callers_whatever_lies_between() {
-        let names = [
-            "core::panicking::panic",
-            "OUTLINED_FUNCTION_3",
-            "OUTLINED_FUNCTION_4",
-            "<[u8] as core::ops::index::Index<usize>>::index",
-            "rig::work",
-            "rig::tick",
-            "rig::rest",
-        ];
-        let functions: Vec<(u64, u64, String)> = (1..)
-            .zip(names)
-            .map(|(n, name)| (16 * n, 8, name.into()))
-            .collect();
-        let calls = [
-            vec![],
-            vec![48],
-            vec![16],
-            vec![8, 16],
-            vec![32],
-            vec![64, 16],
-            vec![112],
-        ];
-        let found = callers(&functions, &calls);
-        assert_eq!(found.len(), 1);
-        assert_eq!(found[0].name, "core::panicking::panic");
-        assert_eq!(found[0].callers, ["rig::work", "rig::tick"]);
+    fn a_panic_is_of_the_kind_of_its_place() {
+        let kind = |frames: &[(&str, &str, u32)]| {
+            let frames: Vec<Frame> = frames
+                .iter()
+                .map(|(function, file, line)| Frame {
+                    function: (*function).into(),
+                    file: (*file).into(),
+                    line: *line,
+                })
+                .collect();
+            Kind::of(&frames)
+        };
+        let ours = (
+            "tactus_core::rig::stage::Stage::tick",
+            "./shared/src/rig/stage.rs",
+            7,
+        );
+        let library = (
+            "core::slice::copy_from_slice",
+            "/rustc/x/library/core/src/slice.rs",
+            9,
+        );
+        let other = (
+            "cobs::decode",
+            "cargo/registry/src/cobs-0.3.0/src/dec.rs",
+            3,
+        );
+        assert_eq!(kind(&[ours]), Kind::Ours);
+        // what panics for somebody else
+        assert_eq!(kind(&[library, ours]), Kind::Ours);
+        assert_eq!(kind(&[library, other, ours]), Kind::Dependency);
+        assert_eq!(kind(&[library]), Kind::Dependency);
+        for name in ["a::b::{{closure}}", "a::b::{closure#0}"] {
+            let polled = (name, "./firmware/src/tasks/watch.rs", 9);
+            assert_eq!(kind(&[polled]), Kind::Resumed);
+            assert_eq!(kind(&[library, polled]), Kind::Ours);
+        }
+        let merged = ("tactus_firmware::boot::ends", "./firmware/src/boot.rs", 0);
+        assert_eq!(kind(&[merged]), Kind::Merged);
     }
 }

@@ -94,7 +94,9 @@ impl Obedient {
 }
 
 impl Hand for Obedient {
-    const FEELS_GRAVITY: bool = true;
+    fn feels_gravity(&self) -> bool {
+        true
+    }
 
     fn gravity(&self) -> Option<f32> {
         let (g, zero) = self.g;

@@ -5,7 +5,6 @@ use embedded_graphics::pixelcolor::BinaryColor;
 
 use super::letters::{LARGE, SMALL};
 use super::{Brush, Done, say};
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 
@@ -37,7 +36,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.sentence("Force is set", &text)
     }
 
-    #[cfg(any(feature = "turns", test))]
     pub(super) fn turn(&mut self, over: bool) -> Done<D> {
         self.title("Calibrate", "keep still")?;
         let (first, second) = if over {
@@ -49,7 +47,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.centre(second, 38, &LARGE)
     }
 
-    #[cfg(any(feature = "turns", test))]
     pub(super) fn turned(&mut self, turned: &Turned) -> Done<D> {
         let off = (turned.offset_counts / turned.g_counts * 1e3) as i16;
         let text = say(format_args!(

@@ -8,7 +8,6 @@ use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::touch::Taken;
-#[cfg(any(feature = "turns", test))]
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::rig::{self, Fault};
@@ -47,7 +46,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// Asks the person to point the finger straight down, and then to turn it `over`.
-    #[cfg(any(feature = "turns", test))]
     pub fn ask_to_turn(&mut self, over: bool) {
         self.ask(Asked::default(), Page::Turn(over));
         if over {
@@ -113,7 +111,6 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// What came of [`Job::TurnOver`](super::Job::TurnOver), in the same way.
-    #[cfg(any(feature = "turns", test))]
     pub fn turned(&mut self, done: Result<Turned, Option<&'static str>>) {
         self.release();
         self.came_of(done, Page::Turned);
@@ -144,9 +141,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         Some(match (&self.page, self.touch.view().phase) {
             (Page::Again(why), _) => Prompt::Again(*why),
             (Page::Weigh(mn), _) if self.touch.has_zero() => Prompt::Weigh(*mn),
-            #[cfg(any(feature = "turns", test))]
             (Page::Turn(false), _) => Prompt::Still,
-            #[cfg(any(feature = "turns", test))]
             (Page::Turn(true), _) => Prompt::TurnOver,
             (Page::Touching, Phase::Slide | Phase::Sliding) => Prompt::Slide,
             (Page::Touching, Phase::Air | Phase::Press) if self.touch.has_zero() => Prompt::Press,

@@ -43,7 +43,6 @@ pub(super) enum Entry {
     Compare,
     About,
     SetForce,
-    #[cfg(any(feature = "turns", test))]
     TurnOver,
     Known(u16),
     Numbered,
@@ -57,7 +56,6 @@ pub(super) struct Entries<'j> {
     pub(super) list: List,
     pub(super) judgement: Option<&'j Judgement>,
     pub(super) textures: u16,
-    #[cfg(any(feature = "turns", test))]
     pub(super) turns: bool,
 }
 
@@ -66,7 +64,6 @@ impl<'j> Entries<'j> {
     /// other textures.
     pub(super) fn count(self) -> u16 {
         match self.list {
-            #[cfg(any(feature = "turns", test))]
             List::Menu if self.turns => 5,
             List::Menu => 4,
             List::Reference => self.textures.saturating_add(1),
@@ -86,7 +83,6 @@ impl<'j> Entries<'j> {
             (List::Menu, 0) => return Entry::Compare,
             (List::Menu, 1) => return Entry::About,
             (List::Menu, 2) => return Entry::SetForce,
-            #[cfg(any(feature = "turns", test))]
             (List::Menu, 3) if self.turns => return Entry::TurnOver,
             (List::Reference, at) if at < self.textures => return Entry::Known(at),
             (List::Menu | List::Reference, _) => return Entry::Nothing,
@@ -124,7 +120,6 @@ impl<'j> Entries<'j> {
                     Entry::Compare => "is it the same as ..?",
                     Entry::About => "about this probe",
                     Entry::SetForce => "set the force",
-                    #[cfg(any(feature = "turns", test))]
                     Entry::TurnOver => "turn it over",
                     Entry::Known(texture) => table.and_then(|t| t.name(texture)).unwrap_or("?"),
                     Entry::Numbered => {

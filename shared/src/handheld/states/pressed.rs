@@ -89,7 +89,6 @@ impl<K: Kernels> Handheld<'_, K> {
                 self.job = Some(Job::Calibrate);
                 self.show(Page::Air);
             }
-            #[cfg(any(feature = "turns", test))]
             Entry::TurnOver => {
                 self.job = Some(Job::TurnOver);
                 self.show(Page::Turn(false));

@@ -1,11 +1,8 @@
 //! A slide that may end before its end: see [`crate::explorer::Look`].
 
-#[cfg(any(test, feature = "early"))]
-use crate::explorer::most_doubt;
-use crate::explorer::{Explorer, Kernels, ObserveError};
+use crate::explorer::{Explorer, Kernels, ObserveError, most_doubt};
 use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::Rig;
-#[cfg(any(test, feature = "early"))]
 use crate::sensor::pressure::samples_in;
 use crate::table::Action;
 
@@ -13,14 +10,12 @@ use crate::table::Action;
 #[derive(Clone, Copy)]
 pub(super) struct Length {
     /// Its number, from 1.
-    #[cfg(any(test, feature = "early"))]
     n: u8,
     /// At constant speed.
     pub(super) ms: u16,
 }
 
 /// Makes a slide; the length at which it ended, if the verdict was certain before its end.
-#[cfg(any(test, feature = "early"))]
 pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
     rig: &mut R,
     explorer: &mut Explorer<'_, N, K>,
@@ -52,18 +47,7 @@ pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
     rig.perform_until(slide, enough).await.map(|()| ended)
 }
 
-#[cfg(not(any(test, feature = "early")))]
-pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
-    rig: &mut R,
-    _explorer: &mut Explorer<'_, N, K>,
-    _action: Action,
-    slide: &mut Slide<'_, K>,
-) -> Result<Option<Length>, R::Error> {
-    rig.perform(slide).await.map(|()| None)
-}
-
 /// What a slide says that ended at this length, or at its end.
-#[cfg(any(test, feature = "early"))]
 pub(super) fn measure<K: Kernels>(
     mut slide: Slide<'_, K>,
     length: Option<Length>,
@@ -72,14 +56,6 @@ pub(super) fn measure<K: Kernels>(
         Some(length) => slide.look(samples_in(length.ms)),
         None => slide.finish(),
     }
-}
-
-#[cfg(not(any(test, feature = "early")))]
-pub(super) fn measure<K: Kernels>(
-    slide: Slide<'_, K>,
-    _length: Option<Length>,
-) -> Result<Measurement, SlideError> {
-    slide.finish()
 }
 
 /// Takes in a slide that ended at this length, or at its end.
@@ -92,7 +68,6 @@ pub(super) fn observe<const N: usize, K: Kernels>(
     let slide = Observation::from(slide);
     match length {
         // the table knows the length: it was looked at
-        #[cfg(any(test, feature = "early"))]
         Some(length) => explorer.observe_early(action, length.n, &slide).map(|_| ()),
         _ => explorer.observe(action, &slide),
     }

@@ -8,10 +8,11 @@ use crate::sensor::slot::Transaction;
 pub const GAP_US: u32 = 50;
 /// Time left after a read, us: 10 in HDR and MM; SPM fig. 14 has 5.
 pub const REST_US: u32 = 10;
-/// What MOSI says while a sample is read (SPM).
+/// The bytes on MOSI while a sample is read (SPM).
 pub const READ_MOSI: [u8; 2] = [0x00, 0x01];
 
 /// The bytes of the commands, by channel number. The second byte is ignored (SPM); 0 as in LIB.
+#[allow(clippy::indexing_slicing)] // while compiling
 const COMMANDS: &[[u8; 2]; Channel::E19 as usize + 1] = &{
     let mut all = [[0x00; 2]; Channel::E19 as usize + 1];
     let mut number = 0;
@@ -86,7 +87,8 @@ impl Channel {
         Self::ALL.into_iter().find(|c| c.command() == command)
     }
 
-    /// What to do to get a sample of this channel: the command and, 50 us later, the read.
+    /// The transactions for a sample of this channel: the command and, 50 us later, the read.
+    #[allow(clippy::indexing_slicing)] // the last channel is the last command
     pub const fn transactions(self) -> [Transaction; 2] {
         [
             Transaction::first_port(&COMMANDS[self as usize], 0, GAP_US),

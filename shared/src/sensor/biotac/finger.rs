@@ -9,8 +9,8 @@ use crate::sensor::finger::{AtRest, FingerModel, FingerName};
 use crate::sensor::pressure::{Calibration, Channel, Pressure};
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
-/// A BioTac as a [`PressureSensor`]. Its other channels are read with [`Channel::transactions`](super::Channel::transactions) and
-/// [`decode`].
+/// A BioTac as a [`PressureSensor`]. Its other channels are read with
+/// [`Channel::transactions`](super::Channel::transactions) and [`decode`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BioTac;
 

@@ -46,7 +46,7 @@ impl Property {
         }
     }
 
-    /// What to do to read `N` bytes of this property. Zeros are sent meanwhile, as LIB does.
+    /// The transactions that read `N` bytes of this property. Zeros are sent meanwhile, as LIB does.
     const fn read<const N: usize>(self) -> [Transaction; 2] {
         const { assert!(N <= MAX_BYTES) };
         [
@@ -124,7 +124,7 @@ fn check_answer(property: Property, reply: &[u8]) -> Result<(), PropertyError> {
     Ok(())
 }
 
-/// What a sensor is.
+/// The identity of a sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Identity {
     /// Serial number: beginning with "BT".
@@ -224,7 +224,7 @@ impl<SPI: AsyncSpiDevice, D: AsyncDelayNs> Driver<BioTac, SPI, D> {
     }
 }
 
-/// Why the answer to a property is not one.
+/// The reasons why the answer to a property is invalid.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum PropertyError {
     /// All bytes are 00 or all are FF.

@@ -225,7 +225,7 @@ fn a_garbled_identity_is_an_error() {
     });
 }
 
-/// What a bus and a delay were asked to do, in one order: two mocks cannot tell which came first.
+/// The calls to a bus and a delay in one order: two mocks cannot tell which came first.
 #[derive(Clone, PartialEq, Eq, Debug)]
 enum Event {
     /// MOSI of a transaction, chip select low before and high after.

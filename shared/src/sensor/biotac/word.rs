@@ -15,8 +15,8 @@ const PADDING: u8 = 0b110;
 ///
 /// # Errors
 /// In this order, so that each word has one answer:
-/// - [`WordError::ErrorFrame`] if byte 0 is A5, whatever byte 1 is: an error frame may fail parity too, and read as data
-///   it would be 2629;
+/// - [`WordError::ErrorFrame`] if byte 0 is A5, whatever byte 1 is: an error frame may fail parity too, and read as
+///   data it would be 2629;
 /// - [`WordError::NoSensor`] for FF FF and 00 00. They fail the parity of both bytes, which one flipped bit of a sample
 ///   cannot do (it spoils one byte), so a flipped bit is never taken for a missing sensor;
 /// - [`WordError::Parity`] if either byte fails;
@@ -69,7 +69,7 @@ const fn is_odd(byte: u8) -> bool {
     byte.count_ones() % 2 == 1
 }
 
-/// Why a word is no sample.
+/// The reasons why a word is not a sample.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum WordError {
     /// The sensor reports an error in the command or its timing.
@@ -164,7 +164,7 @@ impl ErrorCode {
         }
     }
 
-    /// Whether the read came too soon after the command.
+    /// Returns whether the read came too soon after the command.
     pub const fn is_too_early(self) -> bool {
         matches!(self, Self::SamplingDelay | Self::Delay)
     }

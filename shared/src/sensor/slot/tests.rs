@@ -12,7 +12,7 @@ use crate::sensor::mems::Mems;
 use crate::sensor::pressure::{Channel, SLOTS_HZ};
 use crate::sensor::{PressureSensor, ads1220, iis3dwb, slot_of};
 
-/// What a part of the wire saw: select, mode, bytes, and the pause behind them, us.
+/// A transaction on the wire: select, mode, bytes, and the pause behind them, us.
 type Seen = (u8, Mode, Vec<u8>, u32);
 
 /// Slots `0..slots` of a finger, whose parts answer with `says`: what went over the wire, and the counts.
@@ -102,7 +102,7 @@ fn a_finger_of_two_parts_has_two_selects_and_two_modes() {
     assert_eq!(counts[15..18], [force, vibration, force]);
 }
 
-/// What a part answers to each step of a start-up list.
+/// The answers of a part to each step of a start-up list.
 fn start<S: PressureSensor>(
     mut says: impl FnMut(usize, &[u8]) -> Vec<u8>,
 ) -> Result<(), Unexpected> {

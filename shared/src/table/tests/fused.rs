@@ -6,8 +6,8 @@ use crate::table::tests::whitening::{Noise, World, by_hand, learned as whitening
 
 const BANDS: FeatureSet = FeatureSet::Bands;
 
-/// Two textures, two movements and two features, field by field as the module's page has it: movements begin at byte 16,
-/// whitenings at 28, cells at 52, trials at 68, the lineage at 72, numbers and tallies at 76, names at 86.
+/// Two textures, two movements and two features, field by field as the module's page has it: movements begin at byte
+/// 16, whitenings at 28, cells at 52, trials at 68, the lineage at 72, numbers and tallies at 76, names at 86.
 fn small_fused() -> Vec<u8> {
     let mut bytes = b"TACT\x03\0\x01\x02\x67\0\0\0\x02\0\x02\x02".to_vec();
     bytes.extend(b"\xee\x04\x10\x27\0\0"); // 1262 mN, 10000 um/s
@@ -313,7 +313,7 @@ fn five() -> [Vec<u8>; 2] {
     ]
 }
 
-/// What a change of a table with these names must leave as it is.
+/// Checks the parts of a table that a change must leave for these names.
 fn unchanged(old: &Table<'_>, new: &Table<'_>, names: &[&str]) {
     assert_eq!(frame(new), frame(old));
     assert_eq!(new.lineage(), old.lineage());

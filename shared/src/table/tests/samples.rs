@@ -1,5 +1,5 @@
-//! What a table says of samples: read back, carried over by a probe that learns, renames and deletes, and no part of what is
-//! decided.
+//! A table's notes on samples: read back, carried over by a probe that learns, renames and deletes, and no part of a
+//! decision.
 
 use super::damage::read_all;
 use super::sections::{changed, full};

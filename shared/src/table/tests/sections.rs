@@ -46,7 +46,7 @@ pub(super) fn full() -> Vec<u8> {
     table.as_bytes().to_vec()
 }
 
-/// Where the sections begin in [`full`].
+/// The offset of the sections in [`full`].
 fn begin(bytes: &[u8]) -> usize {
     bytes.len() - CRC_BYTES - (4 + 8 + 8 + 4 + 52 + 2 * (14 + 8))
 }

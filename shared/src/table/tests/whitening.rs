@@ -296,7 +296,7 @@ fn features_without_scatter_of_their_own_are_bounded() {
     assert!((apart_2 - 12f64.sqrt()).abs() < 0.1, "{apart_2}");
 }
 
-/// What textures are apart in one canonical variate says nothing of the others, and the first says the most.
+/// Distances of textures in one canonical variate are independent of the others, and the first has the largest.
 #[test]
 fn canonical_variates_of_textures_are_uncorrelated() {
     for (seed, textures, features) in [(7, 117, 14), (8, 20, 13), (9, 6, 13), (10, 2, 3)] {
@@ -482,7 +482,8 @@ fn without_two_slides_of_a_texture_there_is_no_whitening() {
     assert_eq!(whiten(&vec![two; 37]), Err(WhitenError::Movements));
 }
 
-/// Every step by the formula of the running mean; all of them together no farther off than their roundings can add up to.
+/// Every step by the formula of the running mean; all of them together no farther off than their roundings can add up
+/// to.
 #[test]
 fn learning_is_the_running_mean() {
     let noise = &mut Noise(11);

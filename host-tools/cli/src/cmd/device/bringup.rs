@@ -31,7 +31,7 @@ Answers are lines of the standard input: Enter for \"done\", a number, or the nu
 kept in DIR/journal.jsonl; DIR/report.txt, report.json and the curves beside them are to be sent to somebody who helps.
 Ctrl-C stops whatever moves; the exit code is 130 then. It is 1 while a step has not passed.")]
 pub(crate) struct Args {
-    /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, of tactus.toml, or the only NUCLEO that is plugged in, unless given
+    /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
     #[arg(long, value_name = "PORT")]
     port: Option<String>,
     /// Folder of the journal and of the report

@@ -15,7 +15,7 @@ Examples:
   tactus device flash ELF -- --probe 0483:374b:SER   if there are several: `probe-rs list` names them
 `cargo xtask flash` builds the firmware and flashes it.")]
 pub(crate) struct Args {
-    /// The image: what `cargo xtask build` names
+    /// The image: what `cargo xtask size` names
     elf: PathBuf,
     /// Stay attached and show the image's log until Ctrl-C
     #[arg(long)]
@@ -35,7 +35,7 @@ const CHIP: &str = "STM32F429ZITx";
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     ensure!(
         args.dry_run || args.elf.is_file(),
-        "{}: no such file; `cargo xtask build` builds the firmware and names it",
+        "{}: no such file; `cargo xtask size` builds the firmware and names it",
         args.elf.display()
     );
     if !args.dry_run {

@@ -11,7 +11,6 @@ use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_lab::remote::operations;
 use tactus_study::pictures::exploration::Exploration;
-use tactus_study::pictures::timeline::{Timeline, Watch};
 
 use super::bench::Bench;
 use super::line::Where;
@@ -124,13 +123,12 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     let (among, seed) = (wanted.among.len(), wanted.seed);
     let among = if among == 0 { names.len() } else { among };
     let mut slides = Transcript::default();
-    let (mut exploration, mut watch) = (Exploration::new(table), Watch::default());
+    let mut exploration = Exploration::new(table);
     let probe = bench.probe();
     let identified = operations::identify(&probe, wanted, |report| {
         slides.event(&report.event, table);
         if canvas.is_some() {
             exploration.event(&report.event);
-            watch.report(report.at_ms, &report.event);
         }
     });
     let (identified, answered) = bench.done(identified, out)?;
@@ -150,8 +148,7 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
         print_json(&identification, out)?;
     }
     if let Some(canvas) = canvas {
-        let mut figures = exploration.figures(args.stop.threshold)?;
-        figures.extend(watch.last().map(Timeline::figure).transpose()?);
+        let figures = exploration.figures(args.stop.threshold)?;
         canvas.write("tactus device identify", &figures, out)?;
     }
     Ok(match answered.map(|(verdict, _)| verdict.told()) {

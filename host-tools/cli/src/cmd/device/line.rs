@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, SystemTime};
 
-use crate::cmd::config;
+use crate::cmd::environment;
 use crate::cmd::output::{Format, print_json};
 use clap::Args;
 use serde::Serialize;
@@ -19,7 +19,7 @@ const STARTING: Duration = Duration::from_secs(120);
 /// Which probe.
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct Where {
-    /// Its serial port, or HOST:PORT; that of TACTUS_PORT, of tactus.toml, or the only NUCLEO that is plugged in, unless given
+    /// Its serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
     #[arg(long, value_name = "PORT", conflicts_with = "emulated")]
     pub(crate) port: Option<String>,
     /// Start the emulated board with the real firmware, and end it afterwards
@@ -129,7 +129,7 @@ impl Where {
                 lock: None,
             });
         }
-        let name = match self.port.clone().or_else(config::port) {
+        let name = match self.port.clone().or_else(environment::port) {
             Some(port) => port,
             None => only_nucleo(found())?,
         };

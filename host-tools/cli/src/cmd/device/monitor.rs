@@ -3,7 +3,6 @@
 //! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
 //! together.
 
-mod film;
 mod keys;
 mod state;
 mod view;
@@ -22,7 +21,6 @@ use tactus_core::wire::{Command, Identify, Report};
 use tactus_link::lifting::Stopped;
 use tactus_link::{LinkError, OperationError, PortError, Probe, Request};
 
-pub(super) use self::film::film;
 use self::keys::Act;
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};

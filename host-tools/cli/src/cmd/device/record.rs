@@ -23,7 +23,7 @@ use crate::cmd::output::{Format, print_json};
 Examples:
   tactus device record burlap silk --out recordings     asks for the next texture when it is due
   tactus evaluate --recordings recordings
-  tactus device record burlap silk --out anna --operator Anna --lot 7     what tactus gauge asks for
+  tactus device record burlap silk --out anna --operator Anna --lot 7     for tactus report
   tactus device record burlap silk --out turned --moved     on a turntable; the table learned from it says so
   tactus device record burlap silk --out there --same-spot  without asking to move the sample
 A slide on the same track again says little about a texture. So at a terminal the rig stops after each slide of all movements of
@@ -44,10 +44,10 @@ pub(crate) struct Args {
     /// Where on the sample slides begin; drawn anew unless given
     #[arg(long)]
     seed: Option<u32>,
-    /// Batch or piece that the samples are from, for `tactus gauge`
+    /// Batch or piece that the samples are from, for `tactus report`
     #[arg(long, default_value = "", hide_default_value = true)]
     lot: String,
-    /// Who makes the slides, for `tactus gauge`
+    /// Who makes the slides, for `tactus report`
     #[arg(
         long,
         value_name = "NAME",

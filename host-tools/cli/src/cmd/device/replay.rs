@@ -16,12 +16,11 @@ use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_link::follow::{ALLOWED, Agreement, Follower};
 use tactus_study::chart::{DrawError, Figure};
 use tactus_study::pictures::exploration::Exploration;
-use tactus_study::pictures::timeline::{Timeline, Watch};
 
+use super::listen;
 use super::log::{Line, LogError, TableParts, read};
-use super::{listen, monitor};
 use crate::cmd::output::{Format, percent, print_json};
-use crate::cmd::plot::{Plot, svg_file};
+use crate::cmd::plot::Plot;
 
 /// Listen to a probe (--mcap), show the log of a session (--log), or compute its decisions again
 #[derive(clap::Args)]
@@ -34,7 +33,6 @@ Examples:
   tactus device log --mcap - --seconds 60 > minute.mcap
   tactus device log show session.jsonl
   tactus device log show session.jsonl --plot pictures     as `tactus identify` draws them
-  tactus device log film session.jsonl --out film.svg      the monitor, as it would have shown the session
   tactus device log replay session.jsonl    computes every decision again; exit code 1 if one differs"
 )]
 pub(crate) struct Args {
@@ -66,24 +64,6 @@ enum Command {
         #[arg(long, value_enum, default_value_t = Format::Text)]
         format: Format,
     },
-    /// Draw what the monitor shows of the session, as a moving picture (SVG)
-    Film {
-        /// The log; "-" reads standard input
-        file: PathBuf,
-        /// The picture; what is there of this name is replaced
-        #[arg(long, value_name = "FILE.svg", value_parser = svg_file)]
-        out: PathBuf,
-        /// Columns and lines of the terminal, from 60x21 to 200x60; a phone can show 60 columns
-        #[arg(long, value_name = "CxL", default_value = "60x24", value_parser = size)]
-        size: (u16, u16),
-    },
-}
-
-fn size(text: &str) -> Result<(u16, u16), String> {
-    let size = text.split_once('x');
-    let size = size.and_then(|(columns, lines)| Some((columns.parse().ok()?, lines.parse().ok()?)));
-    size.filter(|(columns, lines)| (60..=200).contains(columns) && (21..=60).contains(lines))
-        .ok_or_else(|| "columns and lines from 60x21 to 200x60, such as 80x24".to_owned())
 }
 
 /// Writes, shows or replays a log.
@@ -97,9 +77,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 fn of_a_file(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
     let (file, plot) = match command {
         Command::Replay { file, plot, .. } | Command::Show { file, plot, .. } => (file, plot),
-        Command::Film { file, out, size } => {
-            return monitor::film(file, out, *size).with_context(|| file.display().to_string());
-        }
     };
     let canvas = plot.open()?;
     let done = match command {
@@ -121,13 +98,11 @@ fn pictures(explorations: &[Logged]) -> Result<Vec<Figure>, DrawError> {
         let Some(table) = logged.table() else {
             continue;
         };
-        let (mut exploration, mut watch) = (Exploration::new(table), Watch::default());
-        for (event, at_ms) in logged.events.iter().zip(&logged.at_ms) {
+        let mut exploration = Exploration::new(table);
+        for event in &logged.events {
             exploration.event(event);
-            watch.report(*at_ms, event);
         }
         let mut figures = exploration.figures(logged.asked.threshold)?;
-        figures.extend(watch.last().map(Timeline::figure).transpose()?);
         for figure in &mut figures {
             if explorations.len() > 1 {
                 figure.id = format!("{number}-{}", figure.id);

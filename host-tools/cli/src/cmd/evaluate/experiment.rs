@@ -4,15 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
-use tactus_core::explorer::SlideTime;
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::learn::Expected;
-use tactus_lab::eval::seconds;
 use tactus_study::fabricslide::FabricSet;
 
-use crate::cmd::args::{Choosing, Ending, Expecting, Features, Recordings, Stop};
+use crate::cmd::args::{Ending, Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
@@ -46,9 +44,7 @@ shorter explorations are when a slide ends as soon as the verdict is certain, an
 
 --plot draws what is told of each texture (confusion), how often it was right when it said 99 %
 (reliability), and slides and errors by threshold (slides-by-threshold, errors-by-threshold). With
---novelty it draws what is told of known and of new textures (known-by-slides, new-by-slides), with
---verify one error against the other (trade-off), with --lifelong how far slides move away from
-what was learned (drift, drift-by-texture) and what is told of them (told-...), slide by slide.
+--verify it draws one error against the other (trade-off).
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
@@ -56,11 +52,10 @@ Examples:
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
-  tactus evaluate --fabrics DIR --objective bits-per-second      slow slides have to tell more
+  tactus evaluate --fabrics DIR
   tactus evaluate --recordings DIR --verify --protocol blocked
   tactus evaluate --recordings DIR --early --protocol blocked
-  tactus evaluate --recordings DIR --lifelong
-  tactus evaluate --recordings DIR --lifelong --plot drift.svg")]
+  tactus evaluate --recordings DIR --lifelong")]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(crate) from: Recordings,
@@ -83,19 +78,19 @@ pub(crate) struct Args {
     #[arg(long, value_enum)]
     pub(crate) features: Option<Features>,
     /// Count how textures that were not learned are noticed
-    #[arg(long, value_enum, conflicts_with = "lifelong")]
+    #[arg(long, value_enum, conflicts_with_all = ["lifelong", "plot"])]
     pub(crate) novelty: Option<Novelty>,
     /// With --novelty: textures that are left out of a table together
     #[arg(long, value_name = "N", default_value_t = 1, requires = "novelty", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) left_out: u16,
     /// Play a session in time order, in which the probe goes on learning
-    #[arg(long)]
+    #[arg(long, conflicts_with = "plot")]
     pub(crate) lifelong: bool,
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with_all = ["lifelong", "novelty"])]
     pub(crate) verify: bool,
     /// End a slide as soon as the verdict is certain, and count what that saves and what it costs
-    #[arg(long, conflicts_with_all = ["lifelong", "novelty", "verify", "properties", "fabrics", "test"])]
+    #[arg(long, conflicts_with_all = ["lifelong", "novelty", "verify", "properties", "fabrics", "test", "plot"])]
     pub(crate) early: bool,
     #[command(flatten)]
     pub(crate) ending: Ending,
@@ -112,8 +107,6 @@ pub(crate) struct Args {
     pub(crate) expecting: Expecting,
     #[command(flatten)]
     pub(crate) stop: Stop,
-    #[command(flatten)]
-    pub(crate) choosing: Choosing,
     /// The same seed gives the same figures, whatever the number of cores
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -125,14 +118,6 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// How long slides take.
-    pub(crate) fn slide_time(&self) -> SlideTime {
-        match self.fabrics {
-            Some(_) => seconds::FABRICS,
-            None => seconds::RIG,
-        }
-    }
-
     /// Number of virtual explorations, or of sessions.
     pub(crate) fn runs(&self) -> u64 {
         self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })

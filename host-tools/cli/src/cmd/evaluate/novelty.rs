@@ -11,11 +11,9 @@ use tactus_lab::eval::lifelong::{self, Learning, Lifelong};
 use tactus_lab::eval::novelty::{self, Novelty};
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verdicts::Verdicts;
-use tactus_study::pictures::{novelty as of_novelty, session};
 
 use super::experiment::Args;
 use crate::cmd::output::{Format, print_json, verdict_rows};
-use crate::cmd::plot::Canvas;
 use crate::cmd::progress::with_progress;
 
 /// What `evaluate --novelty` prints.
@@ -48,7 +46,6 @@ pub(crate) fn leave_one_out(
     experiment: &Experiment,
     protocol: &'static str,
     config: Config,
-    canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     let together = usize::from(args.left_out);
@@ -62,9 +59,6 @@ pub(crate) fn leave_one_out(
     let novelty = with_progress(args.runs(), "presenting new textures", |done| {
         novelty::leave_out(experiment, config, together, args.runs(), done)
     })?;
-    if let Some(canvas) = canvas {
-        canvas.write("tactus evaluate", &of_novelty::figures(&novelty)?, out)?;
-    }
     let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
     if args.format == Format::Json {
         let figures = NoveltyFigures {
@@ -118,7 +112,6 @@ pub(crate) fn lifelong(
     args: &Args,
     experiment: &Experiment,
     config: Config,
-    canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     // they differ in the order of the textures only
@@ -127,14 +120,7 @@ pub(crate) fn lifelong(
     let lifelong = with_progress(3 * sessions, "living through sessions", |done| {
         lifelong::lifelong(experiment, config, sessions, seed, done)
     })?;
-    let figures = canvas.as_ref();
-    let figures = figures.map(|_| session::figures(&lifelong, train_slides));
-    let figures = figures.transpose()?.unwrap_or_default();
-    print_lives(args, train_slides, lifelong, out)?;
-    match canvas {
-        Some(canvas) => canvas.write("tactus evaluate --lifelong", &figures, out),
-        None => Ok(()),
-    }
+    print_lives(args, train_slides, lifelong, out)
 }
 
 fn print_lives(

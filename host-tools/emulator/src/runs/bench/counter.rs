@@ -1,4 +1,4 @@
-//! The bench image on the emulated chip: gives it work, and holds what it finds against the plain kernels on this PC.
+//! The bench inside the silicon image on the emulated chip: gives it work, and holds what it finds against the plain kernels on this PC.
 
 use std::path::Path;
 
@@ -26,7 +26,9 @@ pub(super) struct Bench {
     traces: bool,
 }
 
-/// Offsets in the bench image's `Desk`.
+/// What has the silicon image serve the bench.
+const WANTED: u32 = 0x7ac7_be7c;
+/// Offsets in the silicon image's `Desk`.
 const STATE: u64 = 0;
 const WORKLOAD: u64 = 4;
 const INSTRUCTIONS: u64 = 16;
@@ -55,9 +57,11 @@ fn unsuitable(workload: Workload, what: &'static str) -> BenchError {
 }
 
 impl Bench {
-    /// Boots the bench image, to count cycles, too, where it `traces`.
+    /// Boots the silicon image as bench, to count cycles, too, where it `traces`.
     pub(super) fn start(elf: &Path, traces: bool) -> Result<Self, BenchError> {
         let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
+        let (wanted, _) = emulator.symbol("BENCH_WANTED")?;
+        emulator.write(wanted, &WANTED.to_le_bytes())?;
         let (desk, _) = emulator.symbol("BENCH_DESK")?;
         // where the chip says that it counts
         let (counts, _) = emulator.symbol("BENCH_COUNTS")?;

@@ -31,7 +31,7 @@ const STEP_NS: u64 = 100_000;
 /// What is done to the firmware in the end.
 struct OnPurpose {
     what: &'static str,
-    /// The function by its mangled name, and what its first instruction is instead; the reset pin without any.
+    /// The function by the name that it exports, and what its first instruction is instead; the reset pin without any.
     code: Option<(&'static str, [u8; 2])>,
 }
 
@@ -43,15 +43,15 @@ const CRASHES: [u8; 2] = [0x00, 0xDE];
 const ON_PURPOSE: [OnPurpose; 4] = [
     OnPurpose {
         what: "the tasks of thread mode hang",
-        code: Some(("___watch_task_inner_function0E4poll", HANGS)),
+        code: Some(("tactus_check_in", HANGS)),
     },
     OnPurpose {
         what: "the servo hangs",
-        code: Some(("___servo_task_inner_function0E4poll", HANGS)),
+        code: Some(("tactus_servo_tick", HANGS)),
     },
     OnPurpose {
         what: "the servo crashes",
-        code: Some(("___servo_task_inner_function0E4poll", CRASHES)),
+        code: Some(("tactus_servo_tick", CRASHES)),
     },
     OnPurpose {
         what: "the reset pin",

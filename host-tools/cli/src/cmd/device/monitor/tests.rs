@@ -12,7 +12,6 @@ use tactus_core::wire::{
     Text, Verdict,
 };
 
-use super::film::Film;
 use super::keys::{Act, KEYS, press};
 use super::state::{Monitor, NOTES, SHOWN};
 use super::{is_gone, view};
@@ -435,92 +434,4 @@ fn a_terminal_that_is_closed_is_noticed() {
     assert!(!is_gone(&terminal));
     drop(other);
     assert!(is_gone(&terminal));
-}
-
-/// What a moving picture shows in one of its frames, as [`screen`] has it.
-fn filmed(svg: &str, frame: usize, width: u16, height: u16) -> Vec<String> {
-    let picture = roxmltree::Document::parse(svg).unwrap();
-    let mut cells = vec![vec![' '; width.into()]; height.into()];
-    let groups = picture.descendants().filter(|n| n.has_tag_name("g"));
-    let shown = groups.filter(|n| {
-        n.attribute("class").is_none_or(|class| {
-            let (from, to) = class[1..].split_once('_').unwrap();
-            (from.parse().unwrap()..to.parse().unwrap()).contains(&frame)
-        })
-    });
-    for text in shown
-        .flat_map(|g| g.children())
-        .filter(|n| n.has_tag_name("text"))
-    {
-        let number = |key| text.attribute(key).unwrap().parse::<f64>().unwrap();
-        let (column, line) = (
-            (number("x") / 8.4).round(),
-            (number("y") / 17.0 - 0.5).round(),
-        );
-        let letters: Vec<char> = text.text().unwrap().chars().collect();
-        assert!((number("textLength") - 8.4 * letters.len() as f64).abs() < 0.1);
-        for (n, letter) in letters.into_iter().enumerate() {
-            cells[line as usize][column as usize + n] = letter;
-        }
-    }
-    let lines = cells
-        .into_iter()
-        .map(|line| line.into_iter().collect::<String>());
-    lines.map(|line| line.trim_end().to_owned()).collect()
-}
-
-#[test]
-fn a_film_shows_what_the_monitor_showed() {
-    let (width, height) = (60, 24);
-    let mut film = Film::new((width, height), 10_000);
-    let mut monitor = heard([]);
-    let mut screens = Vec::new();
-    let mut see = |at_ms, monitor: &Monitor| {
-        film.see(at_ms, monitor);
-        let now = screen(monitor, width, height);
-        if screens.last() != Some(&now) {
-            screens.push(now);
-        }
-    };
-    see(0, &monitor);
-    monitor.asked(&Command::Identify(Default::default()));
-    see(500, &monitor);
-    // nothing has changed
-    see(900, &monitor);
-    for (event, number) in exploration().into_iter().zip(1..) {
-        let at_ms = 1000 * u32::from(number);
-        monitor.hear(&Report {
-            number,
-            at_ms,
-            event,
-        });
-        see(at_ms.into(), &monitor);
-    }
-    // too soon after the last one
-    monitor.asked(&Command::Home);
-    film.see(4100, &monitor);
-    monitor.asked(&Command::Stop);
-    film.end(5000, &monitor);
-    screens.push(screen(&monitor, width, height));
-    let svg = film.svg("4 < 5");
-    assert!(svg.contains("4 &lt; 5"));
-    for (number, screen) in screens.iter().enumerate() {
-        assert_eq!(&filmed(&svg, number, width, height), screen, "{number}");
-    }
-    assert!(screens.len() >= 6, "{}", screens.len());
-    // 5 s and 3 s of the last frame: the first one is gone after half a second
-    assert!(svg.contains("animation-duration:8.00s"), "{svg}");
-    assert!(
-        svg.contains("@keyframes k0_1{0.000%{visibility:visible}6.250%{visibility:hidden}}"),
-        "{svg}"
-    );
-    // letters that a phone can show
-    let wide = roxmltree::Document::parse(&svg).unwrap();
-    let wide: f64 = wide
-        .root_element()
-        .attribute("width")
-        .unwrap()
-        .parse()
-        .unwrap();
-    assert!(14.0 * 390.0 / wide >= 10.0, "{wide}");
 }

@@ -1,3 +1,0 @@
-//! What the STM32F7 does in its own way.
-pub(super) mod bank2;
-pub(super) mod spi;

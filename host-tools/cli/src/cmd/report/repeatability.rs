@@ -1,0 +1,239 @@
+//! `tactus report` without a table: how repeatable probe and operators are.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use serde::Serialize;
+use tactus_core::features::{Movement, Property};
+use tactus_lab::data::recording::Labels;
+use tactus_lab::eval::gauge::{Reading, Study, distinct, study};
+use tactus_lab::eval::show::count;
+use tactus_study::chart::{DrawError, Figure};
+use tactus_study::pictures::control;
+
+use crate::cmd::output::{Format, UsageError, percent, print_json};
+use crate::cmd::plot::Plot;
+use crate::cmd::textures::measure_folder;
+
+/// The object that `report --format json` prints of recordings alone.
+#[derive(Serialize)]
+struct Gauged {
+    parts: usize,
+    operators: Vec<String>,
+    slides: usize,
+    movements: Vec<AtMovement>,
+}
+
+/// What slides of one movement come to.
+#[derive(Serialize)]
+struct AtMovement {
+    force_n: f32,
+    speed_mm_s: f32,
+    #[serde(skip)]
+    movement: Movement,
+    properties: Vec<Gauge>,
+}
+
+/// What one property comes to.
+#[derive(Serialize)]
+struct Gauge {
+    property: &'static str,
+    unit: &'static str,
+    #[serde(flatten)]
+    study: Study,
+    /// Readings outside the control limits, in words.
+    outside_slides: Vec<String>,
+    #[serde(skip)]
+    readings: Vec<Reading>,
+}
+
+/// A slide of one of the folders.
+struct Taken {
+    movement: Movement,
+    part: String,
+    labels: Labels,
+    number: u32,
+    values: [Option<f32>; 3],
+}
+
+/// Prints the variances of the slides in `folders`, and draws control charts.
+pub(super) fn run(
+    folders: &[PathBuf],
+    plot: &Plot,
+    format: Format,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let canvas = plot.open()?;
+    let mut slides = Vec::new();
+    for (n, folder) in folders.iter().enumerate() {
+        if folders[..n].contains(folder) {
+            let say = format!(
+                "--recordings {}: this folder was given before",
+                folder.display()
+            );
+            return Err(UsageError(say).into());
+        }
+        take(folder, &mut slides)?;
+    }
+    let gauged = gauge(&slides)?;
+    match format {
+        Format::Json => print_json(&gauged, out)?,
+        Format::Text => print(&gauged, out)?,
+    }
+    if let Some(canvas) = canvas {
+        canvas.write("Control charts", &charts(&gauged)?, out)?;
+    }
+    Ok(())
+}
+
+/// Draws a control chart for each property at each movement.
+fn charts(gauged: &Gauged) -> Result<Vec<Figure>, DrawError> {
+    let mut figures = Vec::new();
+    for (at, movement) in (1..).zip(&gauged.movements) {
+        for gauge in &movement.properties {
+            let property = gauge.property;
+            let id = match gauged.movements.len() {
+                1 => format!("control-{property}"),
+                _ => format!("control-{property}-{at}"),
+            };
+            let title = format!("{property}, {}", movement.movement);
+            let unit = format!(" ({})", gauge.unit);
+            let (readings, study) = (&gauge.readings, &gauge.study);
+            figures.push(control::figure(&id, &title, &unit, readings, study)?);
+        }
+    }
+    Ok(figures)
+}
+
+fn take(folder: &Path, slides: &mut Vec<Taken>) -> anyhow::Result<()> {
+    let (set, measured) = measure_folder(folder)?;
+    for (index, (texture, measured)) in set.textures().iter().zip(&measured).enumerate() {
+        for (slide, key) in measured.iter().zip(set.slides(index)) {
+            let labels = key.labels.clone();
+            let part = match labels.lot.as_str() {
+                "" => texture.name.clone(),
+                lot => format!("{}, lot {lot}", texture.name),
+            };
+            let properties = &slide.measurement.properties;
+            slides.push(Taken {
+                movement: slide.movement,
+                part,
+                labels,
+                number: slide.number,
+                values: Property::ALL.map(|property| properties.get(property)),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn gauge(slides: &[Taken]) -> anyhow::Result<Gauged> {
+    let mut movements = Vec::new();
+    for movement in distinct(slides.iter().map(|s| s.movement)) {
+        let of = || slides.iter().filter(|s| s.movement == movement);
+        let mut properties = Vec::new();
+        for (n, property) in Property::ALL.into_iter().enumerate() {
+            let readings: Option<Vec<Reading>> = of()
+                .map(|s| {
+                    Some(Reading {
+                        part: s.part.clone(),
+                        operator: s.labels.operator.clone(),
+                        slide: s.number,
+                        value: s.values[n]?.into(),
+                    })
+                })
+                .collect();
+            // a rig without force sensing measures no traction
+            let Some(readings) = readings else { continue };
+            let study = study(&readings).with_context(|| movement.to_string())?;
+            let outside = study.outside.iter().map(|&n| {
+                let Reading {
+                    part,
+                    operator,
+                    slide,
+                    ..
+                } = &readings[n];
+                let by = if operator.is_empty() { "" } else { ", " };
+                format!("{part}{by}{operator}, slide {slide}")
+            });
+            properties.push(Gauge {
+                property: property.name(),
+                unit: if property == Property::Traction {
+                    "N"
+                } else {
+                    "ln"
+                },
+                outside_slides: outside.collect(),
+                study,
+                readings,
+            });
+        }
+        movements.push(AtMovement {
+            force_n: movement.force_n(),
+            speed_mm_s: movement.speed_mm_s(),
+            movement,
+            properties,
+        });
+    }
+    let operators = slides.iter().map(|s| s.labels.operator.clone());
+    Ok(Gauged {
+        parts: distinct(slides.iter().map(|s| &s.part)).len(),
+        operators: distinct(operators.filter(|name| !name.is_empty())),
+        slides: slides.len(),
+        movements,
+    })
+}
+
+fn print(gauged: &Gauged, out: &mut impl Write) -> anyhow::Result<()> {
+    let by = match gauged.operators.len() {
+        0 => "nobody named as operator".to_owned(),
+        n => count(n as u64, "operator"),
+    };
+    writeln!(
+        out,
+        "{}, {by}, {}",
+        count(gauged.parts as u64, "part"),
+        count(gauged.slides as u64, "slide")
+    )?;
+    for movement in &gauged.movements {
+        writeln!(
+            out,
+            "\n{}; standard deviations\n{:<14} {:>13} {:>10} {:>13} {:>10} {:>10} {:>9}",
+            movement.movement,
+            "property",
+            "repeatability",
+            "operators",
+            "by part",
+            "parts",
+            "gauge",
+            "classes"
+        )?;
+        for gauge in &movement.properties {
+            let sd = &gauge.study.sd;
+            let dash = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.4}"));
+            let classes = gauge.study.distinct_categories;
+            writeln!(
+                out,
+                "{:<14} {:>13.4} {:>10} {:>13} {:>10.4} {:>10} {:>9}",
+                format!("{} ({})", gauge.property, gauge.unit),
+                sd.repeatability,
+                dash(sd.operator),
+                dash(sd.operator_by_part),
+                sd.part,
+                percent((gauge.study.gauge_share * 1000.0).round() / 1000.0),
+                classes.map_or("-".to_owned(), |n| n.to_string())
+            )?;
+        }
+        for gauge in &movement.properties {
+            for slide in &gauge.outside_slides {
+                writeln!(
+                    out,
+                    "outside the control limits of {}: {slide}",
+                    gauge.property
+                )?;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,367 @@
+//! `cargo xtask campaign`: long checks, and how each of them ended in one sentence.
+mod board;
+mod factory;
+mod fuzz;
+mod seeds;
+
+use std::ffi::OsString;
+use std::ops::RangeInclusive;
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, ensure};
+use clap::{Args, ValueEnum};
+
+use crate::shell::{cargo, has_subcommand, hear, root, run, target};
+use crate::{emulate, firmware, page};
+pub(crate) use factory::{FOLDER, TABLES};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask campaign all --book                   everything, a day or two; each result goes into the book
+  cargo xtask campaign rig --finger mems            seeds 1 to 20 on the emulated board, with another finger
+  cargo xtask campaign identify --seeds 200-330     every method
+  cargo xtask campaign study --seeds 1-10 -- --simulations 8000
+  cargo xtask campaign faults --seeds 1-2000        goes on where it was interrupted
+  cargo xtask campaign faults --seeds 17 -- --again one of them once more
+  cargo xtask campaign boards -- --simulated 4 --recordings 0
+  cargo xtask campaign soak -- --pc-hours 1 --board-hours 0
+  cargo xtask campaign factory -- --write           makes the tables that come with the firmware, shared/tables/*.tact
+  cargo xtask campaign fuzz -- table --seconds 60   one target
+  cargo xtask campaign mutants -- --in-diff my.diff only what a diff touches";
+
+/// The page of the book that lists the results.
+const BOOK: &str = "docs/src/tests.md";
+
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Part to run
+    #[arg(value_enum, default_value_t = Part::All)]
+    part: Part,
+    /// Seeds of a part that takes them; each has its own default
+    #[arg(long, value_name = "A-B", value_parser = range)]
+    seeds: Option<RangeInclusive<u64>>,
+    /// Number of runs at a time; all cores unless given
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Finger of the emulated board in rig and handheld: biotac, analog or mems
+    #[arg(long, value_name = "NAME", default_value = "biotac")]
+    finger: String,
+    /// Write the result into the book, docs/src/tests.md
+    #[arg(long)]
+    book: bool,
+    /// Options of the part
+    #[arg(last = true)]
+    options: Vec<OsString>,
+}
+
+/// A part of the campaign.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Every other part, the short ones first
+    All,
+    /// The factory tables, made again from the simulated world and compared
+    Factory,
+    /// The page in a browser, with the firmware on the emulated board
+    Page,
+    /// The package for the registry, packed, and compiled as others will
+    Package,
+    /// Tests that `cargo xtask test` leaves out, in the workspace and on emulated boards
+    Tests,
+    /// Explorations on the emulated board
+    Rig,
+    /// Explorations by the handheld on the emulated board, in a hand that differs from seed to seed
+    Handheld,
+    /// Explorations on emulated boards, simulated and recorded, which the PC follows to the bit
+    Boards,
+    /// Power cuts at every word that the firmware stores
+    Cuts,
+    /// The PC's simulated rig, which breaks at any moment of whatever its probe does
+    Faults,
+    /// The same on emulated boards, with the firmware
+    BoardFaults,
+    /// A day on the simulated rig and an hour on the emulated board, with random faults
+    Soak,
+    /// `tactus study all`, with few simulations
+    Study,
+    /// `tactus identify --simulated`, by every method
+    Identify,
+    /// `tactus simulate`
+    Simulate,
+    /// `tactus learn-by-hand`
+    LearnByHand,
+    /// `tactus verify --simulated`: a texture against itself, and the next one against it
+    Verify,
+    /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
+    Press,
+    /// libFuzzer against frames, tables, the store's flash, recordings and scenarios, on stable Rust; wants a C++
+    /// compiler
+    Fuzz,
+    /// The same with a bug planted in each target, which must be found
+    Planted,
+    /// The core's tests on copies of the core with one thing changed (cargo-mutants): a mutant that survives is seen by
+    /// no test
+    Mutants,
+}
+
+impl Part {
+    fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// The seeds of a part that takes them.
+    fn seeds(self, options: &Options) -> Option<RangeInclusive<u64>> {
+        let usual = match self {
+            Self::Study | Self::Press => 1..=100,
+            Self::Identify | Self::Simulate | Self::LearnByHand | Self::Verify => 1..=50,
+            Self::Rig | Self::Handheld => 1..=20,
+            Self::Faults | Self::BoardFaults => 1..=300,
+            _ => return None,
+        };
+        Some(options.seeds.clone().unwrap_or(usual))
+    }
+}
+
+/// Parses `A-B`, or one seed.
+fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let (from, to) = text.split_once('-').unwrap_or((text, text));
+    match (from.parse(), to.parse()) {
+        (Ok(from), Ok(to)) if from <= to => Ok(from..=to),
+        _ => Err("two numbers are wanted, the lower first: 1-50".into()),
+    }
+}
+
+/// Runs a part, or all of them.
+pub(crate) fn campaign(options: &Options) -> Result<()> {
+    let parts = match options.part {
+        Part::All => &Part::value_variants()[1..],
+        _ => &[options.part],
+    };
+    ensure!(
+        parts.len() == 1 || (options.seeds.is_none() && options.options.is_empty()),
+        "`all` runs every part as usual: it takes no seeds and no options of a part"
+    );
+    let (mut rows, mut failed) = (Vec::new(), 0);
+    for part in parts {
+        let began = Instant::now();
+        let done = perform(*part, options);
+        failed += usize::from(done.is_err());
+        let result = done.unwrap_or_else(|why| format!("FAILED: {why:#}"));
+        rows.push(row(
+            &part.name(),
+            &result,
+            began.elapsed().as_secs().div_ceil(60),
+        )?);
+        if options.book {
+            let page = root().join(BOOK);
+            let text = std::fs::read_to_string(&page).context(BOOK)?;
+            let text = in_book(&text, &part.name(), &rows[rows.len() - 1])?;
+            std::fs::write(&page, text).context(BOOK)?;
+        }
+    }
+    println!("\n{}", rows.join("\n"));
+    ensure!(failed == 0, "failed parts: {failed} of {}", parts.len());
+    Ok(())
+}
+
+/// A row of the book's table: the part, its result, the commit and the minutes.
+fn row(part: &str, result: &str, minutes: u64) -> Result<String> {
+    let mut git = Command::new("git");
+    let commit = git
+        .args(["describe", "--always", "--dirty"])
+        .current_dir(root())
+        .output()?;
+    let commit = String::from_utf8_lossy(&commit.stdout);
+    let result = result.replace(['\n', '|'], " ");
+    Ok(format!(
+        "| `{part}` | {result} | {} | {minutes} min |",
+        commit.trim()
+    ))
+}
+
+/// The page with a new row for a part in place of its old one.
+fn in_book(page: &str, part: &str, row: &str) -> Result<String> {
+    let begin = format!("| `{part}` |");
+    ensure!(page.contains(&begin), "{BOOK} has no row {begin}");
+    let lines = page
+        .lines()
+        .map(|line| if line.starts_with(&begin) { row } else { line });
+    Ok(lines.collect::<Vec<_>>().join("\n") + "\n")
+}
+
+/// Runs a part, and returns its result in a sentence.
+fn perform(part: Part, options: &Options) -> Result<String> {
+    println!("== campaign {}", part.name());
+    let seeds = part.seeds(options);
+    ensure!(
+        seeds.is_some() || options.seeds.is_none(),
+        "{} takes no --seeds",
+        part.name()
+    );
+    let board = [Part::Rig, Part::Handheld].contains(&part);
+    ensure!(
+        board || options.finger == "biotac",
+        "--finger is for rig and handheld"
+    );
+    match (part, seeds) {
+        (Part::Factory, _) => factory::factory(options.options == ["--write"]),
+        (Part::Page, _) => page::emulated().map(|()| "passed".into()),
+        (Part::Package, _) => package(),
+        (Part::Tests, _) => left_out(),
+        (Part::Boards, _) => on_boards("campaign", &["--cuts", "0"], options),
+        (Part::Cuts, _) => on_boards(
+            "campaign",
+            &["--simulated", "0", "--recordings", "0"],
+            options,
+        ),
+        (Part::Soak, _) => on_boards("soak", &[], options),
+        (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
+        (Part::Fuzz, _) => fuzz::fuzz(&options.options),
+        (Part::Planted, _) => fuzz::fuzz(&["--planted", "--seconds", "150"].map(OsString::from)),
+        (Part::Mutants, _) => mutants(&options.options),
+        (_, Some(seeds)) => seeds::run(part, &seeds, options),
+        (_, None) => Ok(String::new()),
+    }
+}
+
+/// The result of a run of the emulator.
+fn result(emulator: &mut Command) -> Result<String> {
+    let mut lines = Vec::new();
+    hear(emulator, |line| lines.push(line.to_owned()))?;
+    Ok(sentence(&lines))
+}
+
+/// Of a report's lines, those with verdicts, and the last one that is a sentence and no row, path or list.
+fn sentence(lines: &[String]) -> String {
+    let is_sentence = |line: &&String| line.contains(' ') && !line.starts_with(' ');
+    let verdicts = lines.iter().filter(|line| line.contains(" right, "));
+    let all: Vec<&str> = verdicts
+        .chain(lines.iter().rfind(is_sentence))
+        .map(|line| line.as_str())
+        .collect();
+    all.join(" ")
+}
+
+/// Runs the emulator with the rig's firmware.
+fn on_boards(run: &str, usual: &[&str], options: &Options) -> Result<String> {
+    let usual = usual.iter().map(OsString::from);
+    // what is given comes last, and counts
+    let all: Vec<OsString> = usual.chain(options.options.iter().cloned()).collect();
+    result(&mut emulate::command(run, &all)?)
+}
+
+fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
+    let file = target()
+        .join("campaign")
+        .join(part.name())
+        .with_extension("jsonl");
+    let count = seeds.end() - seeds.start() + 1;
+    let mut all: Vec<OsString> = vec!["--faults".into(), count.to_string().into()];
+    all.extend([
+        "--seed".into(),
+        seeds.start().to_string().into(),
+        "--out".into(),
+        file.into(),
+    ]);
+    if let Some(jobs) = options.jobs {
+        all.extend(["--jobs".into(), jobs.to_string().into()]);
+    }
+    all.extend(options.options.iter().cloned());
+    if part == Part::BoardFaults {
+        all.push("--board".into());
+        return result(&mut emulate::command("faults", &all)?);
+    }
+    run(&mut emulate::build())?;
+    result(emulate::program("faults").args(all))
+}
+
+/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own.
+fn left_out() -> Result<String> {
+    let ignored = ["--", "--ignored", "--skip", "the_whole_campaign"];
+    let mut board_tests = emulate::tests();
+    let board_tests = emulate::with_images(&mut board_tests, &firmware::elves()?)?;
+    let (mut passed, mut workspace) = (0, cargo());
+    workspace.args(["test", "--release", "--workspace", "--no-fail-fast"]);
+    for tests in [&mut workspace, board_tests] {
+        hear(tests.args(ignored), |line| {
+            let result = line.strip_prefix("test result: ok. ");
+            let count = result.and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
+            passed += count.unwrap_or_default();
+        })?;
+    }
+    Ok(format!("{passed} tests passed."))
+}
+
+/// Packs and compiles the core, which alone goes to the registry; without the network, as the workspace was built.
+fn package() -> Result<String> {
+    let mut package = cargo();
+    package.args([
+        "package",
+        "--package",
+        "tactus-core",
+        "--allow-dirty",
+        "--offline",
+        "--locked",
+    ]);
+    run(&mut package).map(|()| "The package compiles.".into())
+}
+
+fn mutants(options: &[OsString]) -> Result<String> {
+    if !has_subcommand("mutants") {
+        return Ok("Not run: cargo install cargo-mutants --locked".into());
+    }
+    let mut cargo = cargo();
+    cargo.args(["mutants", "--package", "tactus-core"]);
+    cargo.args(["--test-package", "tactus-core", "--profile", "mutants"]);
+    for module in ["sensor", "table", "explorer"] {
+        cargo.args(["--file", &format!("shared/src/{module}*")]);
+        cargo.args(["--file", &format!("shared/src/{module}*/**")]);
+    }
+    result(cargo.args(options))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_of_seeds_is_two_numbers_or_one() {
+        assert_eq!(range("3-7"), Ok(3..=7));
+        assert_eq!(range("5"), Ok(5..=5));
+        for wrong in ["7-3", "", "a", "1-", "-1"] {
+            assert!(range(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn every_part_has_a_row_in_the_book_and_a_result_replaces_it() {
+        let page = std::fs::read_to_string(root().join(BOOK)).unwrap();
+        for part in &Part::value_variants()[1..] {
+            let row = row(&part.name(), "2 | 3\nright", 7).unwrap();
+            let page = in_book(&page, &part.name(), &row).unwrap();
+            assert!(
+                page.contains(&format!("| `{}` | 2   3 right | ", part.name())),
+                "{page}"
+            );
+        }
+        assert!(in_book(&page, "nothing", "").is_err());
+    }
+
+    #[test]
+    fn a_report_is_its_verdicts_and_its_last_sentence() {
+        let lines = [
+            "19 of 20 right, 1 slide.",
+            "a table",
+            "All limits are met. (3 s)",
+            "",
+        ];
+        let lines = lines.map(str::to_owned);
+        assert_eq!(
+            sentence(&lines),
+            "19 of 20 right, 1 slide. All limits are met. (3 s)"
+        );
+        let lines = ["2 cases, 0 failed", "  1 named", "target/x.jsonl"].map(str::to_owned);
+        assert_eq!(sentence(&lines), "2 cases, 0 failed");
+    }
+}
