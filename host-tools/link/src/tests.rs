@@ -559,6 +559,61 @@ fn bytes_without_end_are_no_answer() {
     }
 }
 
+/// Does an operation; its file is kept or not, and its question answered like this.
+fn does<T>(
+    operation: impl Future<Output = T>,
+    host: &super::Probe,
+    probe: &mut Probe,
+    (keeps, says): (bool, bool),
+) -> T {
+    let (mut operation, mut now) = (std::pin::pin!(operation), Duration::ZERO);
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    loop {
+        if let Poll::Ready(done) = operation.as_mut().poll(&mut context) {
+            return done;
+        }
+        now += Duration::from_millis(10);
+        host.carry(&probe.receive(&host.to_send()), now);
+        if let Some(backup) = host.backup() {
+            assert_eq!(backup.bytes, probe.table);
+            let full = Err("the disk is full".to_owned());
+            host.kept(if keeps { Ok(backup.name) } else { full });
+        }
+        if host.question().is_some() {
+            host.answer(says);
+        }
+    }
+}
+
+#[test]
+fn nothing_is_lost_without_a_copy_and_a_yes() {
+    let mut probe = Probe {
+        parts: usize::MAX,
+        table: table(3),
+        ..Probe::default()
+    };
+    let time = Duration::from_secs(5);
+    let host = super::Probe::new("here", time, time);
+    let forget = || operations::forget(&host, Forget::SelfLearned);
+    let forgets = |command: &Command| matches!(command, Command::Forget(_));
+    let reads = |command: &Command| matches!(command, Command::ReadTable(_));
+    for (answers, why) in [
+        ((false, true), "the disk is full"),
+        ((true, false), "nothing was changed"),
+    ] {
+        let said = does(forget(), &host, &mut probe, answers).unwrap_err();
+        assert_eq!(said.to_string(), why);
+        assert!(!probe.asked.iter().any(forgets));
+    }
+    does(forget(), &host, &mut probe, (true, true)).unwrap();
+    assert!(probe.asked.iter().any(forgets));
+    // pulled once, and once more after it may have become another one
+    let pulled = |probe: &Probe| probe.asked.iter().filter(|c| reads(c)).count();
+    assert_eq!(pulled(&probe), 1);
+    does(host.table(), &host, &mut probe, (true, true)).unwrap();
+    assert_eq!(pulled(&probe), 2);
+}
+
 fn damage() -> impl Strategy<Value = Vec<(usize, u8)>> {
     proptest::collection::vec((0usize..20_000, 1u8..), 0..6)
 }
