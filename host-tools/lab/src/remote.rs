@@ -1,5 +1,6 @@
-//! A probe at a line that somebody else carries, a page for example: [`Remote`] is asked in JSON, gets the bytes that came and the
-//! time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus device` does and says.
+//! A probe at a line that somebody else carries, a page for example: [`Remote`] is asked in JSON, gets the bytes that
+//! came and the time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus
+//! device` does and says.
 
 #[cfg(feature = "open")]
 pub mod mcap;

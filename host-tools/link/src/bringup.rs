@@ -1,9 +1,9 @@
-//! The first evening of a new rig: a person and the self-test image go through its parts step by step, then with the rig's own
-//! firmware, and what is wrong is named.
+//! The first evening of a new rig: a person and the self-test image go through its parts step by step, then with the
+//! rig's own firmware, and what is wrong is named.
 //!
-//! The board only measures ([`tactus_core::wire::bringup`]); limits and names of mistakes are here ([`judge`], [`MISTAKES`]), where a
-//! PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board ([`Board`]) and asks whoever is there
-//! ([`Person`]). It knows the core only.
+//! The board only measures ([`tactus_core::wire::bringup`]); limits and names of mistakes are here ([`judge`],
+//! [`MISTAKES`]), where a PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board
+//! ([`Board`]) and asks whoever is there ([`Person`]). It knows the core only.
 
 mod journal;
 pub mod judge;
@@ -61,8 +61,8 @@ pub fn next_image(journal: &Journal) -> Option<Image> {
     next.map(Step::image)
 }
 
-/// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that takes another
-/// image.
+/// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that
+/// takes another image.
 ///
 /// # Errors
 /// See [`Trouble`].

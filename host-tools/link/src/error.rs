@@ -22,7 +22,8 @@ pub enum PortError {
     Silent(Duration),
     /// Bytes come, and none of them is a report.
     #[error(
-        "{0} bytes came and not one report: this is not the probe's port, or not its baud rate, or another firmware runs there"
+        "{0} bytes came and not one report: this is not the probe's port, or not its baud rate, or another firmware \
+             runs there"
     )]
     Garbage(u64),
     /// See [`LinkError`].
@@ -93,10 +94,11 @@ impl OperationError {
     }
 }
 
-/// What follows a failure of the line, while something moved.
+/// The sentence after a failure of the line while something moved.
 fn after(why: &PortError, moving: bool) -> &'static str {
     if moving && !matches!(why, PortError::Link(_)) {
-        ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its emergency stop"
+        ".\nThe rig was moving: the probe goes on and lifts the finger at the end. To stop it now, press its \
+             emergency stop"
     } else {
         ""
     }

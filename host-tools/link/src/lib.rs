@@ -1,9 +1,10 @@
-//! The host's end of the link to the probe; without the feature `serial` without IO of its own: bytes come in, bytes go out.
+//! The host's end of the link to the probe; without the feature `serial` without IO of its own: bytes come in, bytes go
+//! out.
 //!
-//! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of them
-//! ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way.
-//! [`Probe`] runs jobs over bytes that somebody else carries, for [`operations`] that follow each other; [`Port`] carries its bytes
-//! over anything that reads and writes: a serial line, a TCP connection.
+//! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of
+//! them ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way. [`Probe`]
+//! runs jobs over bytes that somebody else carries, for [`operations`] that follow each other; [`Port`] carries its
+//! bytes over anything that reads and writes: a serial line, a TCP connection.
 
 pub mod bringup;
 mod error;

@@ -63,7 +63,7 @@ impl RigWatch {
     }
 }
 
-/// What came of stopping.
+/// The result of a stop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Stopped {
     /// All is well.
@@ -74,7 +74,8 @@ pub enum Stopped {
     NotHome,
     /// The probe did not answer, or nobody waits for it.
     #[error(
-        "the probe has not said that the finger is lifted: it may still be down. Look at the rig; its emergency stop lifts it"
+        "the probe has not said that the finger is lifted: it may still be down. Look at the rig; its emergency stop \
+             lifts it"
     )]
     NotLifted,
 }
@@ -87,7 +88,7 @@ pub struct Lifting {
 }
 
 impl Lifting {
-    /// What was said of the rig so far does not count any more.
+    /// Begins; earlier reports of the rig no longer count.
     pub fn begin(rig: &mut RigWatch, now: Duration) -> Self {
         (rig.phase, rig.fault) = (None, None);
         Self {
@@ -96,7 +97,7 @@ impl Lifting {
         }
     }
 
-    /// What is to be sent now.
+    /// Returns the commands that are to be sent now.
     pub fn asks(&mut self, now: Duration) -> Option<[Command; 3]> {
         let due = self.asked.is_none_or(|at| now.saturating_sub(at) > AGAIN);
         due.then(|| {
@@ -105,7 +106,7 @@ impl Lifting {
         })
     }
 
-    /// What came of it; `None`: it is still on its way.
+    /// The result; `None` while the rig is on its way.
     pub fn came(&self, rig: &RigWatch, now: Duration) -> Option<Stopped> {
         let since = now.saturating_sub(self.began);
         if since >= LIFTING {

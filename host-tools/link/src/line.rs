@@ -17,12 +17,13 @@ const READ: Duration = Duration::from_millis(50);
 /// USB vendor of the NUCLEO's ST-LINK.
 const ST: u16 = 0x0483;
 
-/// Why there is no line to the probe, and what to do.
+/// An error on the way to a line, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
     /// Nothing is plugged in.
     #[error(
-        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try --emulated"
+        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try \
+             --emulated"
     )]
     None,
     /// More than one.
@@ -38,7 +39,8 @@ pub enum LineError {
     },
     /// Another program has it.
     #[error(
-        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
+        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close \
+             that; \
          `fuser -v {0}` names it"
     )]
     Busy(String),
@@ -55,7 +57,7 @@ pub enum LineError {
     Serial {
         /// Its name.
         port: String,
-        /// What the system says.
+        /// The system's words.
         why: serialport::Error,
     },
     /// No such address, or nobody there.
@@ -65,7 +67,7 @@ pub enum LineError {
     Tcp {
         /// Host and port.
         address: String,
-        /// What the system says.
+        /// The system's words.
         why: io::Error,
     },
 }
@@ -75,12 +77,12 @@ pub enum LineError {
 pub struct PortInfo {
     /// Its name.
     pub name: String,
-    /// What the USB device says of itself, if it is one.
+    /// The USB device's description of itself, if it is one.
     pub usb: Option<UsbPortInfo>,
 }
 
 impl PortInfo {
-    /// Whether it is an ST-LINK, as a NUCLEO has.
+    /// Returns true for an ST-LINK, as a NUCLEO has.
     pub fn is_nucleo(&self) -> bool {
         self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
     }
@@ -145,7 +147,7 @@ pub fn found() -> Vec<PortInfo> {
     ports
 }
 
-/// What carries bytes to the probe and back; reads come back soon, with or without any.
+/// A carrier of bytes to the probe and back; reads come back soon, with or without any.
 pub trait Line: Read + Write + Send {}
 impl<T: Read + Write + Send> Line for T {}
 

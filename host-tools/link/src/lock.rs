@@ -1,4 +1,5 @@
-//! Locks of ports: one command at a time has a port, by a locked file. The system unlocks it when the process ends, however it ends.
+//! Locks of ports: one command at a time has a port, by a locked file. The system unlocks it when the process ends,
+//! however it ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, Write as _};
@@ -13,7 +14,8 @@ pub struct PortLock(#[expect(dead_code, reason = "its lock ends with it")] Optio
 /// Another command has the port.
 #[derive(PartialEq, Debug, thiserror::Error)]
 #[error(
-    "{port} is used by `{command}` (process {process}) since {}: wait for it or end it, it cannot be watched from a second \
+    "{port} is used by `{command}` (process {process}) since {}: wait for it or end it, it cannot be watched from a \
+         second \
      command",
     ago(*.for_)
 )]
@@ -32,7 +34,7 @@ fn ago(time: Duration) -> String {
     }
 }
 
-/// Where the files lie: only this user can write there.
+/// The folder of the locks: only this user can write there.
 fn folder() -> Option<PathBuf> {
     let given = |variable| std::env::var_os(variable).map(PathBuf::from);
     given("XDG_RUNTIME_DIR")

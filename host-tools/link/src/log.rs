@@ -1,8 +1,10 @@
 //! Logs of sessions, which `tactus device --log` writes: a line of JSON for every command and every report.
 //!
-//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":7,"port":"/dev/ttyACM0"}}`. Each other one is
-//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
-//! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
+//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":7,"port":"/dev/ttyACM0"}}`. Each other
+//! one is
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log
+//! itself: the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and
+//! answered.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -124,7 +126,8 @@ pub enum LogError {
     },
     /// Messages of another version.
     #[error(
-        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the tactus \
+        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the \
+             tactus \
          that wrote it",
         oldest = LOGGED.start()
     )]

@@ -1,4 +1,5 @@
-//! Operations on a probe, each once: the command line, the page, Python and the emulator call them. Each says what people read in the
+//! Operations on a probe, each once: the command line, the page, Python and the emulator call them. Each says what
+//! people read in the
 //! probe's [`words`](Probe::words), and returns what programs read.
 
 mod calibrate;
@@ -86,7 +87,7 @@ pub struct Learned {
     pub slides: u32,
     /// Its sample was moved or turned between trials, as the table says it.
     pub sample_moved: Option<bool>,
-    /// Why the table does not say so, in a sentence.
+    /// The reason why the table does not say so, in a sentence.
     #[serde(skip)]
     pub not_noted: Option<String>,
     /// The table in use now.
@@ -124,7 +125,7 @@ async fn learned(probe: &Probe, name: &str, slides: u32, before: &[u8]) -> Resul
     })
 }
 
-/// What is known of a sample between trials.
+/// Knowledge of a sample between trials.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Deserialize)]
 #[serde(from = "Option<bool>")]
 pub enum Sample {
@@ -153,7 +154,7 @@ pub struct Training {
     pub pilot: bool,
     /// For where on the sample slides begin.
     pub seed: u32,
-    /// What is known of the sample.
+    /// Knowledge of the sample.
     #[serde(default, rename = "moved")]
     pub sample: Sample,
 }

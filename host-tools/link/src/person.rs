@@ -6,11 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// A question that has to be answered before an operation goes on.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Question {
-    /// What has to be known for it; may be empty.
+    /// Facts that have to be known for it; may be empty.
     pub said: String,
     /// The question, or what somebody is to do.
     pub asked: String,
-    /// What yes and no mean.
+    /// The meaning of yes and no.
     pub kind: QuestionKind,
 }
 

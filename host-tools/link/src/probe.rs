@@ -1,7 +1,9 @@
 //! A probe that operations are done with, over bytes that somebody else carries.
 //!
-//! An operation is a future that holds a [`Probe`]. Whoever carries the bytes polls it, and between two polls hands over what
-//! came and what time it is ([`carry`](Probe::carry)), sends what is due, shows the [`words`](Probe::take_words), keeps the log
+//! An operation is a future that holds a [`Probe`]. Whoever carries the bytes polls it, and between two polls hands
+//! over what
+//! came and what time it is ([`carry`](Probe::carry)), sends what is due, shows the [`words`](Probe::take_words), keeps
+//! the log
 //! ([`said`](Probe::said)) and files, and answers the questions.
 
 use std::future::poll_fn;
@@ -241,7 +243,7 @@ impl Probe {
         state.now = now.max(state.now);
     }
 
-    /// What is to be sent now.
+    /// Returns the bytes that are to be sent now.
     pub fn to_send(&self) -> Vec<u8> {
         take(&mut self.state().send)
     }
@@ -321,7 +323,7 @@ impl Probe {
 
     // ---- for operations
 
-    /// Where words for people go.
+    /// A writer of words for people.
     pub fn words(&self) -> Words {
         self.words.clone()
     }
@@ -400,7 +402,8 @@ impl Probe {
             .await
     }
 
-    /// Runs a transaction to its end; `each` gets every report. Whatever ends it early leaves the rig stopped and lifted.
+    /// Runs a transaction to its end; `each` gets every report. Whatever ends it early leaves the rig stopped and
+    /// lifted.
     pub async fn run<E: Transaction>(
         &self,
         transaction: E,
@@ -412,7 +415,8 @@ impl Probe {
         outcome.ok_or(Stopped::Lifted.into())
     }
 
-    /// Runs a transaction as [`run`](Self::run) does, and `each` may break it off: `None` then, and the rig is stopped and
+    /// Runs a transaction as [`run`](Self::run) does, and `each` may break it off: `None` then, and the rig is stopped
+    /// and
     /// lifted.
     pub async fn run_until<E: Transaction>(
         &self,

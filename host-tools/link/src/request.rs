@@ -84,7 +84,7 @@ impl Request<()> {
 }
 
 impl Request<Status> {
-    /// How the probe is.
+    /// Asks for the status of the probe.
     pub fn status() -> Self {
         Self::new(Command::Status, None, |event, answer| {
             if let Event::Status(status) = event {

@@ -1,9 +1,10 @@
-//! Notes in a table on its samples: whether they were moved or turned between the trials that it was learned from. A slide on
+//! Notes in a table on its samples: whether they were moved or turned between the trials that it was learned from. A
+//! slide on
 //! the same track again says little about a texture.
 
 use tactus_core::table::{EncodeError, Table, samples_length, with_moved};
 
-/// What is true of all of these; `None` where it is not known of one, they differ, or there is none.
+/// Returns what is true of all of these; `None` where it is not known of one, they differ, or there is none.
 pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
     let mut moved = moved.into_iter();
     let first = moved.next()??;
@@ -27,7 +28,7 @@ pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>
     Ok(noted)
 }
 
-/// How the trials of a texture were made: what was said of those of a training, and of those before it.
+/// Statements about the trials of a training, and about those before it.
 #[derive(Debug, Default)]
 pub struct Trials {
     answers: Vec<Option<bool>>,
@@ -39,7 +40,7 @@ impl Trials {
         self.answers.push(moved);
     }
 
-    /// What was said before a trial, from 0. Of the first one nobody is asked: it is as all others are.
+    /// The statement before a trial, from 0. Of the first one nobody is asked: it is as all others are.
     pub fn before_trial(&self, trial: usize) -> Option<bool> {
         match trial.checked_sub(1) {
             Some(asked) => *self.answers.get(asked)?,
@@ -47,13 +48,13 @@ impl Trials {
         }
     }
 
-    /// What is to be noted: what is true of all of them.
+    /// The note: what is true of all of them.
     pub fn moved(&self) -> Option<bool> {
         of_all(self.answers.iter().copied())
     }
 }
 
-/// What becomes of a note on how the sample of a texture was treated.
+/// The result of a note on how the sample of a texture was treated.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Noting {
     /// The table says so already, or does not know the texture.

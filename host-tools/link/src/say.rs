@@ -175,10 +175,11 @@ pub fn movements(high_force: bool) -> String {
 
 /// Facts that a person must know who turns high forces on.
 pub const HIGH_FORCE: &str = "\
-With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies on the
-finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever presses on. What
-keeps the finger whole then is no program: a mount whose spring yields (preloaded to 2.05 N, 0.009 N/mm), or a hard stop that
-the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 N are reached.";
+With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies
+on the finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever
+presses on. What keeps the finger whole then is no program: a mount whose spring yields (preloaded to 2.05 N, 0.009
+N/mm), or a hard stop that the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 N are
+reached.";
 /// The question to such a person.
 pub const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
 
@@ -302,8 +303,8 @@ pub fn show_rows(rows: &[(&str, String)], out: &mut impl Write) -> io::Result<()
         .try_for_each(|(name, value)| writeln!(out, "{name:<15} {value}"))
 }
 
-/// The day of the force scale: "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing for a
-/// scale that was not measured.
+/// The day of the force scale: "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing
+/// for a scale that was not measured.
 pub fn date(c: &RigCalibration) -> Option<String> {
     day(c.scale_day()?)
 }
@@ -320,7 +321,8 @@ pub fn sensor(c: &RigCalibration) -> Option<String> {
     (!serial.is_empty()).then(|| serial.to_owned())
 }
 
-/// Prints what follows an exploration: what the probe learned, what it asks, and the frames and reports that were damaged or lost.
+/// Prints what follows an exploration: what the probe learned, what it asks, and the frames and reports that were
+/// damaged or lost.
 pub fn show_identified(
     identified: &Identified,
     (damaged, missing): (u64, u64),
@@ -394,7 +396,8 @@ pub fn of_sample(moved: Option<bool>) -> &'static str {
     match moved {
         Some(true) => "Its sample was moved between trials.",
         Some(false) => {
-            "Its sample was not moved: slides on the same track say little about a texture. More trials elsewhere on it would help."
+            "Its sample was not moved: slides on the same track say little about a texture. More trials elsewhere on \
+                 it would help."
         }
         None => {
             "The table does not know whether its sample was moved between all trials (--moved and --same-spot say so)."

@@ -190,8 +190,8 @@ impl Probe {
     }
 }
 
-/// Runs a transaction to its end over a line that does to every chunk what `disturb` does; `None` if both ends wait for each
-/// other and the request may not be repeated.
+/// Runs a transaction to its end over a line that does to every chunk what `disturb` does; `None` if both ends wait for
+/// each other and the request may not be repeated.
 fn see_through<E: Transaction>(
     session: &mut Session,
     probe: &mut Probe,

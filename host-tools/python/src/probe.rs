@@ -28,11 +28,13 @@ use crate::recordings::Slide;
 use crate::table::Table;
 use crate::values::object;
 
-/// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a probe that says
-/// nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests and reports, as
+/// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a
+/// probe that says nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests
+/// and reports, as
 /// `tactus device --log FILE` writes it, for `read_log`, `tactus device log` and `tactus convert`.
 ///
-/// Raises ProbeError where there is no such port, or somebody else has it; OSError where there is such a file, or it cannot be written.
+/// Raises ProbeError where there is no such port, or somebody else has it; OSError where there is such a file, or it
+/// cannot be written.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Probe {
     name: String,
@@ -332,13 +334,13 @@ impl Probe {
         Self::begin(slf, Command::Home)
     }
 
-    /// Has the probe find out what lies under its finger: an iterator of its reports, dicts with number, at_ms (its clock) and event
-    /// as on the link: Chosen, SlideReport (with a `posterior` of one probability for each texture), Rejected, Verdict and others. Ctrl-C
-    /// and `close()` stop the rig and lift the finger.
+    /// Has the probe find out what lies under its finger: an iterator of its reports, dicts with number, at_ms (its
+    /// clock) and event as on the link: Chosen, SlideReport (with a `posterior` of one probability for each texture),
+    /// Rejected, Verdict and others. Ctrl-C and `close()` stop the rig and lift the finger.
     ///
-    /// among: names of the textures that it may be. Other arguments as of `Explorer`. learn: whether the probe learns from a verdict
-    /// that is certain. seed: where slides begin, and random choices; drawn anew, unless given. Into a log go the table first and raw
-    /// samples, too: with them `tactus device log replay` computes every decision again.
+    /// among: names of the textures that it may be. Other arguments as of `Explorer`. learn: whether the probe learns
+    /// from a verdict that is certain. seed: where slides begin, and random choices; drawn anew, unless given. Into a
+    /// log go the table first and raw samples, too: with them `tactus device log replay` computes every decision again.
     ///
     /// Raises ProbeError where the probe refuses or is gone, KeyError for a texture that it does not know.
     #[pyo3(signature = (*, among=None, method=None, threshold=0.99, max_slides=10, open=true, learn=false, false_alarm=None, seed=None))]
@@ -390,9 +392,9 @@ impl Probe {
         Self::begin(slf, Command::Identify(wanted))
     }
 
-    /// Has the probe learn what lies under its finger, by this name: an iterator of its reports, as of `identify`; TrainingSlide
-    /// comes with each slide. trials: of each movement in the end, those of an unfinished training included. pilot: all movements of
-    /// the grid.
+    /// Has the probe learn what lies under its finger, by this name: an iterator of its reports, as of `identify`;
+    /// TrainingSlide comes with each slide. trials: of each movement in the end, those of an unfinished training
+    /// included. pilot: all movements of the grid.
     #[pyo3(signature = (name, *, trials=5, pilot=false, seed=None))]
     fn train(
         slf: &Bound<'_, Self>,
@@ -415,8 +417,8 @@ impl Probe {
         Ok(self.get(py, Request::label(name_of(name)?))?.slides)
     }
 
-    /// Records slides of what lies under the finger, movements of the probe's table in turn: a list of `Slide` of that texture. Slides
-    /// that did not arrive whole are left out. Ctrl-C stops the rig and lifts the finger.
+    /// Records slides of what lies under the finger, movements of the probe's table in turn: a list of `Slide` of that
+    /// texture. Slides that did not arrive whole are left out. Ctrl-C stops the rig and lifts the finger.
     #[pyo3(signature = (texture, *, slides=15, seed=None))]
     fn record(
         &self,
@@ -476,8 +478,9 @@ impl Probe {
     }
 }
 
-/// Reads a log that `tactus device --log FILE` wrote: a list of dicts, one for each line, each with one key: "session" (who wrote it),
-/// "command" (what the probe was asked for) or "report" (number, at_ms and event, as `Probe.identify` gives them).
+/// Reads a log that `tactus device --log FILE` wrote: a list of dicts, one for each line, each with one key: "session"
+/// (who wrote it), "command" (what the probe was asked for) or "report" (number, at_ms and event, as `Probe.identify`
+/// gives them).
 ///
 /// Raises ProbeError where it is no log, or of another version, OSError where it cannot be read.
 #[pyfunction]
@@ -499,8 +502,8 @@ fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
     lines.collect()
 }
 
-/// A report as a dictionary. Its posterior is one probability for each texture; on the line and in a log only those are that are not
-/// negligible, with their places.
+/// A report as a dictionary. Its posterior is one probability for each texture; on the line and in a log only those are
+/// that are not negligible, with their places.
 fn reported<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyAny>> {
     let dict = object(py, report)?;
     if let Event::SlideReport { posterior, .. } = &report.event {

@@ -221,8 +221,8 @@ impl Talk {
         self.run(Request::command(command), timeout_s, each)
     }
 
-    /// Waits until the firmware has booted and found the limit switches. A fault of that is given back, after it has been
-    /// asked to home again.
+    /// Waits until the firmware has booted and found the limit switches. A fault of that is given back, after it has
+    /// been asked to home again.
     pub fn ready(
         &mut self,
         mut each: impl FnMut(&mut Emulator, Option<&Report>),

@@ -18,7 +18,8 @@ pub struct Settings {
     pub textures: u8,
     /// Whether it decides as published, one property a slide; otherwise by all features at once.
     pub paper: bool,
-    /// How much change of finger and samples it is to expect, in parts of the usual one (see [`tactus_core::table::Drift`]).
+    /// How much change of finger and samples it is to expect, in parts of the usual one (see
+    /// [`tactus_core::table::Drift`]).
     pub drift: f32,
     /// Where the sample lies, and what the noise is like.
     pub trial: u64,

@@ -17,11 +17,13 @@ pub(super) static PLAN: LazyLock<Plan> = LazyLock::new(Plan::new);
 pub struct Standing {
     /// Probability of each texture of the table.
     pub posterior: Vec<f32>,
-    /// By how much the slides are less like any of the textures than they may be, where the table can tell; above 0: new.
+    /// By how much the slides are less like any of the textures than they may be, where the table can tell; above 0:
+    /// new.
     pub log_odds: Option<f32>,
     /// Whether they are not like the most probable one as that was learned.
     pub changed: bool,
-    /// By how much they are less like any of the textures, as these were learned, than they may be; above 0: changed, or new.
+    /// By how much they are less like any of the textures, as these were learned, than they may be; above 0: changed,
+    /// or new.
     pub changed_by: Option<f32>,
 }
 
@@ -69,7 +71,8 @@ impl Followed {
         self.action.map(|action| action.movement)
     }
 
-    /// Samples of the slide have come: where it has reached one of the table's lengths, that in ms, and what it says so far.
+    /// Samples of the slide have come: where it has reached one of the table's lengths, that in ms, and what it says so
+    /// far.
     pub(super) fn block(
         &mut self,
         lengths_ms: &[u16],

@@ -42,8 +42,8 @@ pub enum Request {
     },
     /// The log of the session so far, as a file.
     Log,
-    /// Files that were [given](super::Remote::give), in this order: a session's log, recordings, or an MCAP file of either. A
-    /// session is heard as if the probe said it now.
+    /// Files that were [given](super::Remote::give), in this order: a session's log, recordings, or an MCAP file of
+    /// either. A session is heard as if the probe said it now.
     #[cfg(feature = "open")]
     Open {
         /// What they are called, with the folders that they lie in.

@@ -1,4 +1,5 @@
-//! Operations on a probe that take a laboratory: its slides are held against a table here, or become recordings. The others are
+//! Operations on a probe that take a laboratory: its slides are held against a table here, or become recordings. The
+//! others are
 //! those of [`link::operations`](tactus_link::operations).
 
 use std::io::{self, Write as _};
@@ -106,7 +107,7 @@ pub struct Wanted {
     pub index: usize,
     /// Slides.
     pub slides: u8,
-    /// What is known of the sample.
+    /// Knowledge of the sample.
     #[serde(default, rename = "moved")]
     pub sample: Sample,
     /// For where on the sample slides begin.
@@ -118,7 +119,7 @@ pub struct Wanted {
 pub struct Recorded {
     /// Those that arrived whole, each with whether the sample was moved before it.
     pub slides: Vec<(Recording, Option<bool>)>,
-    /// Why others did not.
+    /// Reasons why others did not.
     pub lost: Vec<RecordError>,
     /// The status of the probe that made them.
     pub status: Status,
@@ -202,9 +203,9 @@ pub async fn record(probe: &Probe, wanted: &Wanted) -> Result<Recorded> {
 pub struct RefreshedProbe {
     /// Slides that it goes by.
     pub slides: usize,
-    /// How far all textures moved together, standard deviations of a slide.
+    /// The way of all textures together, standard deviations of a slide.
     pub together: f64,
-    /// How far each moved beyond that.
+    /// The way of each beyond that.
     pub moved: Vec<Moved>,
     /// Textures without a new slide.
     pub left_out: Vec<String>,

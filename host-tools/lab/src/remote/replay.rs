@@ -186,7 +186,7 @@ impl Replay {
         self.frame.happened.extend(heard.happened);
     }
 
-    /// What has been since the last time.
+    /// Everything since the last time.
     pub(super) fn frame(&mut self) -> Frame {
         self.take();
         let next = Frame {

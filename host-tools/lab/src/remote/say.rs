@@ -34,7 +34,8 @@ pub fn compare(name: &str, is_new: bool, nearest: &Alike, out: &mut impl Write) 
     if is_new {
         writeln!(
             out,
-            "If it is {other}: tactus device forget --name '{name}', then teach it as '{other}'. If not: consider more trials."
+            "If it is {other}: tactus device forget --name '{name}', then teach it as '{other}'. If not: consider \
+                 more trials."
         )
     } else {
         writeln!(out, "Consider more trials.")

@@ -24,7 +24,7 @@ use tactus_link::person::{self, QuestionKind};
 use tactus_link::probe::{GREETING, TIMEOUT};
 use tactus_link::{OperationError, PortError, Probe};
 
-/// What the page asked for, and what became of it.
+/// The work that the page asked for, and its state.
 #[derive(Default)]
 struct Desk {
     work: Option<Work>,
@@ -220,7 +220,7 @@ impl Open {
         }
     }
 
-    /// What has been since the last one.
+    /// Everything since the last one.
     fn frame(&mut self) -> Answered {
         for line in self.probe.said() {
             line.write(&mut self.log)?;

@@ -1,4 +1,5 @@
-//! What was found so far, a line of JSON for each step that is over, so that the next evening goes on where this one ended.
+//! What was found so far, a line of JSON for each step that is over, so that the next evening goes on where this one
+//! ended.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Write as _};

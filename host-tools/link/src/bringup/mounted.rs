@@ -115,7 +115,8 @@ impl Mounted<'_> {
     /// The first slide.
     pub(super) fn slide(&mut self) -> Result<StepResult, Trouble> {
         self.person
-            .watch("The finger comes down and slides over the paper once. Press the emergency stop if it does anything else.")?;
+            .watch("The finger comes down and slides over the paper once. Press the emergency stop if it does \
+                 anything else.")?;
         let mut seen = SlideSeen::default();
         let mut first_ms = None;
         let one = Identify {

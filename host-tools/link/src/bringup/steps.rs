@@ -123,7 +123,8 @@ pub static STEPS: &[Step] = &[
         checks: "pins that float or are tied",
         how: "the board pulls each pin up and down",
         limit: || {
-            "switches not high; encoder driven; MISO and not MOSI driven by the selected sensor; PD14 high, PE13 and PC8 low by their resistors".to_owned()
+            "switches not high; encoder driven; MISO and not MOSI driven by the selected sensor; PD14 high, PE13 and \
+                 PC8 low by their resistors".to_owned()
         },
         run: Run::SelfTest(|bench| {
             // the pins are looked at when the board starts, before their drivers have them
@@ -175,7 +176,8 @@ pub static STEPS: &[Step] = &[
         limit: || "closed, open while it is pressed, and no other one with it".to_owned(),
         run: Run::SelfTest(|bench| {
             bench.person.done(
-                "Push the stage to its middle by hand; turn the lever's knob until its switch is free; release the emergency stop",
+                "Push the stage to its middle by hand; turn the lever's knob until its switch is free; release the \
+                     emergency stop",
             )?;
             let mut looks = Vec::new();
             for pin in SWITCHES {
@@ -366,7 +368,11 @@ pub static STEPS: &[Step] = &[
         how: "a resistor of 22 ohm, 5 W, in the place of the stage's motor; duties to 0.48 on both sides",
         limit: || range(GAIN, "V/A"),
         run: Run::SelfTest(|bench| {
-            let ohm = bench.person.number("Take the wires of the stage's motor off the bridge, put a resistor of some 22 ohm and 5 W there, and measure it", "ohm")?;
+            let ohm = bench.person.number(
+                "Take the wires of the stage's motor off the bridge, put a resistor of \
+                 some 22 ohm and 5 W there, and measure it",
+                "ohm",
+            )?;
             let supply_v = bench
                 .person
                 .number("Measure the supply of the bridge", "V")?;
@@ -424,7 +430,10 @@ pub static STEPS: &[Step] = &[
             )
         },
         run: Run::SelfTest(|bench| {
-            bench.person.done("Lay the finger down with its tip up, in something that holds it, and let nothing touch the tip")?;
+            bench.person.done(
+                "Lay the finger down with its tip up, in something that holds it, and let nothing \
+                 touch the tip",
+            )?;
             let [air, _] = bench.sensor()?.pdc;
             let mut points = Vec::new();
             for grams in WEIGHTS_G {

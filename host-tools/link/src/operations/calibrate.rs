@@ -35,7 +35,8 @@ pub async fn show_calibration(probe: &Probe) -> Result<RigCalibration> {
     Ok(calibration)
 }
 
-/// Measures P_DC in the air and, of a rig, the motor's current without load, takes over what was measured otherwise, and shows what the
+/// Measures P_DC in the air and, of a rig, the motor's current without load, takes over what was measured otherwise,
+/// and shows what the
 /// probe keeps.
 pub async fn calibrate(probe: &Probe, how: &Calibrating) -> Result<RigCalibration> {
     if how.drifted {

@@ -1,4 +1,5 @@
-//! What a probe keeps: its table, the names in it, and its settings. Before something is lost, the table is kept in a file and somebody
+//! What a probe keeps: its table, the names in it, and its settings. Before something is lost, the table is kept in a
+//! file and somebody
 //! is asked.
 
 use std::io::Write as _;
@@ -120,7 +121,7 @@ async fn use_table(probe: &Probe, table: Table<'_>, again: &str) -> Result<Statu
     Ok(now)
 }
 
-/// What a probe keeps besides its table and its calibration.
+/// Settings that a probe keeps besides its table and its calibration.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Settings {
     /// Share of false alarms that was set; `None`: the table's own holds.

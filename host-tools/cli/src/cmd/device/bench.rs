@@ -1,4 +1,5 @@
-//! A probe that somebody works with at a terminal: its line, the log of what is said, questions, and Ctrl-C, which leaves the rig lifted
+//! A probe that somebody works with at a terminal: its line, the log of what is said, questions, and Ctrl-C, which
+//! leaves the rig lifted
 //! and stopped.
 
 use std::io::{self, Write};
@@ -81,7 +82,7 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Whether there was one since this was asked last.
+    /// Returns true where there was one since the last time.
     pub(crate) fn take(&self) -> bool {
         self.0.swap(false, Relaxed)
     }
@@ -155,7 +156,7 @@ impl Bench {
         self.probe.losses()
     }
 
-    /// What this PC remembers of the probe.
+    /// The memory of this PC of the probe.
     pub(crate) fn history(&self) -> &History {
         &self.history
     }
@@ -165,7 +166,8 @@ impl Bench {
         &self.interrupt
     }
 
-    /// Does an operation, and prints its words where they are for people. Whatever ends it early leaves the rig stopped and lifted.
+    /// Does an operation, and prints its words where they are for people. Whatever ends it early leaves the rig stopped
+    /// and lifted.
     pub(crate) fn done<T>(
         &mut self,
         operation: impl Future<Output = Result<T, OperationError>>,
@@ -310,7 +312,8 @@ impl Bench {
         }
     }
 
-    /// Stops whatever is done, and waits until the finger is lifted and nothing moves. A second Ctrl-C ends the waiting.
+    /// Stops whatever is done, and waits until the finger is lifted and nothing moves. A second Ctrl-C ends the
+    /// waiting.
     pub(crate) fn lift(&mut self) -> Result<Stopped, BenchError> {
         let probe = self.probe();
         self.done(probe.lift(), &mut io::sink())

@@ -1,4 +1,5 @@
-//! Consent to a loss of what a probe has learned: the file that its table is kept in first, and the answer to the question.
+//! Consent to a loss of what a probe has learned: the file that its table is kept in first, and the answer to the
+//! question.
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
@@ -9,7 +10,7 @@ use super::bench::BenchError;
 use super::history;
 use crate::cmd::table_file::write_table;
 
-/// How a command that takes something from the probe is allowed to.
+/// The consent that a command needs which takes something from the probe.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct Consent {
     /// Do it without asking
@@ -59,7 +60,7 @@ pub(super) fn can_be_asked(yes: bool) -> Result<(), BenchError> {
     }
 }
 
-/// Where tables are kept.
+/// The folder that tables are kept in.
 fn folder() -> anyhow::Result<PathBuf> {
     let folder = history::folder()
         .context("there is no home folder to keep the probe's table in: name a file with --backup")?

@@ -70,7 +70,7 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// What `device record` prints with `--format json`.
+/// The object that `device record` prints with `--format json`.
 #[derive(Serialize)]
 struct Recorded<'a> {
     folder: String,

@@ -31,7 +31,7 @@ pub(crate) struct Rename {
     format: Format,
 }
 
-/// What `device rename` prints with `--format json`.
+/// The object that `device rename` prints with `--format json`.
 #[derive(Serialize)]
 struct Renamed<'n> {
     from: &'n str,
@@ -57,7 +57,7 @@ pub(crate) struct Forget {
     format: Format,
 }
 
-/// What `device forget` prints with `--format json`.
+/// The object that `device forget` prints with `--format json`.
 #[derive(Serialize)]
 struct Forgotten {
     /// "texture", "training" or "self-learned".

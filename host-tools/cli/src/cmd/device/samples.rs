@@ -4,7 +4,7 @@ use std::io::IsTerminal as _;
 
 use tactus_link::operations;
 
-/// What a person says of the sample.
+/// A person's statement about the sample.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub(crate) struct Sample {
     /// Note that the sample was moved or turned from slide to slide, and do not ask for it
@@ -16,7 +16,7 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
-    /// What was said on the command line.
+    /// The statement of the command line.
     pub(crate) fn said(self) -> Option<bool> {
         (self.moved || self.same_spot).then_some(self.moved)
     }

@@ -69,7 +69,7 @@ pub(crate) enum Command {
     },
 }
 
-/// What `device table push` and `factory` print with `--format json`.
+/// The object that `device table push` and `factory` prints with `--format json`.
 #[derive(Serialize)]
 struct InUse {
     /// The table that was pushed; `null`: the firmware's own.
