@@ -177,9 +177,9 @@ pub fn movements(high_force: bool) -> String {
 pub const HIGH_FORCE: &str = "\
 With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies
 on the finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever
-presses on. What keeps the finger whole then is no program: a mount whose spring yields (preloaded to 2.05 N,
-0.009 N/mm), or a hard stop that the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before 2 N are
-reached.";
+presses on. What keeps the finger whole then is no program: a mount whose spring yields (preloaded to
+2.05 N, 0.009 N/mm), or a hard stop that the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before
+2 N are reached.";
 /// The question to such a person.
 pub const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
 
