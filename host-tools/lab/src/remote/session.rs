@@ -140,6 +140,12 @@ impl Remote {
             }
             Request::Answer { yes } => {
                 let open = self.at_line()?;
+                // what was said stays where the words are
+                let question = open.probe.question();
+                if let Some(question) = question.filter(|asked| !asked.said.is_empty()) {
+                    let said = question.said + "\n";
+                    io::Write::write_all(&mut open.probe.words(), said.as_bytes())?;
+                }
                 open.probe.answer(yes);
                 open.proceed()
             }
