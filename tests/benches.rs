@@ -5,7 +5,6 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use divan::Bencher;
-use tactus_core::dsp::Plain;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::Movement;
@@ -86,7 +85,7 @@ fn samples(count: usize) -> Vec<i16> {
 fn features_of_a_slide(bencher: Bencher<'_, '_>) {
     let (plan, samples) = (Plan::new(), samples(11_000));
     bencher.bench(|| {
-        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_TRACTION);
+        let mut slide = Slide::new(&plan, Movement::FOR_TRACTION);
         slide.set_background(2.0);
         for block in Block::cut(&[], 0..11_000, &samples, &[]) {
             slide.take(&block);
@@ -177,7 +176,7 @@ fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
     let plan = Plan::new();
     let samples = samples(600);
     let measurement: Measurement = {
-        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
         for block in Block::cut(&[], 0..600, &samples, &[]) {
             slide.take(&block);

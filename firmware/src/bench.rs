@@ -11,8 +11,7 @@ use tactus_core::dsp::Plan;
 
 use self::workload::{Counter, Workload, run};
 use crate::board;
-use crate::chip::Chip;
-use crate::chip::rescue;
+use crate::chip::{KERNELS, rescue};
 
 mod silicon;
 pub mod workload;
@@ -100,7 +99,7 @@ fn bench() -> ! {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
     }
-    let plan = PLAN.init_with(Plan::new);
+    let plan = PLAN.init_with(|| Plan::with(KERNELS));
     let desk = BENCH_DESK.0.get();
     loop {
         // SAFETY: the desk is the chip's while its state is 1, and nobody else on the chip knows it.
@@ -131,7 +130,7 @@ fn serve(desk: &mut Desk, plan: &Plan) -> Option<()> {
         }
         at += bytes.len();
     };
-    run::<Chip>(workload, plan, table, words, &mut cycles, &mut put)?;
+    run(workload, plan, table, words, &mut cycles, &mut put)?;
     desk.instructions = cycles.0;
     desk.results = at as u32;
     (at <= RESULTS).then_some(())

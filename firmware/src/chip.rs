@@ -1,10 +1,8 @@
 //! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its converter's motor current, its
 //! last acts, and the core's kernels in its assembly.
 mod bank2;
-mod confusion_kernel;
 mod critical_section;
 pub(crate) mod current;
-mod decision_kernels;
 mod dsp_kernels;
 pub(crate) mod finger;
 pub(crate) mod flash;
@@ -19,7 +17,7 @@ pub(crate) mod thread;
 mod transform_kernel;
 pub(crate) mod watchdog;
 
-pub(crate) use dsp_kernels::Chip;
+pub(crate) use dsp_kernels::KERNELS;
 
 use crate::board::TURN_CYCLES;
 

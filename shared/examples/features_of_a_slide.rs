@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p tactus-core --example features_of_a_slide`
 
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::features::{Block, Movement, Property, Slide};
 
 /// P_AC samples a second.
@@ -24,7 +24,7 @@ pub(crate) fn main() {
     let samples: Vec<i16> = (0..4400).map(texture).collect();
 
     // 3. samples travel in blocks; those of the slide from 440 on are at constant speed
-    let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_TRACTION);
+    let mut slide = Slide::new(&plan, Movement::FOR_TRACTION);
     for block in Block::cut(&still, 440..4400, &samples, &[412; 100]) {
         slide.take(&block);
     }

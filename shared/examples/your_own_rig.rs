@@ -5,7 +5,7 @@
 use std::f32::consts::TAU;
 
 use embassy_futures::block_on;
-use tactus_core::dsp::{Kernels, Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Block, Movement, Properties, Property, PropertySet, Slide};
 use tactus_core::probe::explore::{ExplorationStep, explore};
@@ -23,7 +23,7 @@ impl Rig for Hum {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error> {
         // a real rig presses here, and measures the still finger
         slide.set_background(2.0);
         let hz = self.0 * slide.movement().speed_mm_s() / 25.0;
@@ -39,7 +39,7 @@ impl Rig for Hum {
 
 /// A texture's slides, with some scatter that a real rig brings along.
 fn learn(mut rig: Hum, plan: &Plan) -> [Experience; 1] {
-    let mut slide = Slide::<Plain>::new(plan, MOVEMENT);
+    let mut slide = Slide::new(plan, MOVEMENT);
     let Ok(()) = block_on(rig.perform(&mut slide));
     let features = slide.finish().expect("a steady part");
     let mut experience = Experience::default();

@@ -9,9 +9,7 @@ mod plan;
 mod spectrum;
 
 pub use fir::BandPower;
-pub use kernels::{Kernels, Plain, Reals};
+pub use kernels::{Kernels, Reals};
 pub use microfft::Complex32;
-pub use plan::{
-    Angles, FRAME, Folded, HALVES, HalfFilters, PASS_BAND_HZ, Plan, TAPS, Taps, angles,
-};
+pub use plan::{Angles, FRAME, Folded, HALVES, HalfFilters, PASS_BAND_HZ, Plan, TAPS, Taps};
 pub use spectrum::{BIN_HZ, BINS, FrameSum, HOP, Spectrum, SpectrumSum};

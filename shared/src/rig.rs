@@ -26,8 +26,6 @@ pub mod timeout;
 pub mod turning;
 pub mod unloaded;
 pub mod weigh;
-
-use crate::dsp::Kernels;
 use crate::features::{PropertySet, Slide};
 
 pub use fault::{FAULTS, Fault};
@@ -38,7 +36,7 @@ pub use phase::{Ended, HIGH_FORCE_MN, Phase, Refused, RigError, most_mn};
 pub const MAX_REJECTED: u8 = 6;
 
 /// Whether no more of a slide is needed.
-pub type Enough<'a, K> = &'a mut dyn FnMut(&mut Slide<'_, K>) -> bool;
+pub type Enough<'a> = &'a mut dyn FnMut(&mut Slide<'_>) -> bool;
 
 /// A board, a simulator or a recording: it makes one movement and delivers the samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
@@ -59,17 +57,17 @@ pub trait Rig {
     ///
     /// # Errors
     /// The movement failed. The stage then stands still and the finger is lifted.
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error>;
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error>;
 
     /// As [`Rig::perform`]; the slide ends as soon as `enough`, asked after each of its blocks, says that no more of it is needed,
     /// and takes in none of what comes after that. A rig that makes all slides to their end does not ask.
     ///
     /// # Errors
     /// As [`Rig::perform`].
-    async fn perform_until<K: Kernels>(
+    async fn perform_until(
         &mut self,
-        slide: &mut Slide<'_, K>,
-        _enough: Enough<'_, K>,
+        slide: &mut Slide<'_>,
+        _enough: Enough<'_>,
     ) -> Result<(), Self::Error> {
         self.perform(slide).await
     }

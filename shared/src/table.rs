@@ -5,16 +5,12 @@
 //! [`encode`]; or the mean of all features of a slide in whitened space, learned as [`Whitened`] and written by
 //! [`encode_fused`]. [`amend`] learns, renames and deletes textures of either kind.
 //!
-//! # Binary form, version 4, little-endian
-//!
-//! A table without sections is written as version 3, one that knows speeds (section 4) as version 5, one that knows
-//! shorter slides (section 6) as version 6; they are the same otherwise. All are read, version 5 by a build that knows
-//! speeds, version 6 by one that can end a slide early.
+//! # Binary form, version 1, little-endian
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4 | magic `TACT` |
-//! | 2 | version, 4, or 3, 5, or 6 |
+//! | 2 | version, 1 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
 //! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
@@ -29,7 +25,7 @@
 //! | 4 | CRC-32 of the table that this one was made from by learning, the first of all; 0 for none |
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8 |
-//! | | from version 4 on: sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
+//! | | sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
 //!
 //! Sections of a fused table; numbers are f32:
@@ -40,7 +36,7 @@
 //! | | 4 M d/2, rounded up | per movement: variance of the drift along each two of the whitened axes |
 //! | 2 | 52 | [`Limits`]: the share of false alarms; of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
 //! | | M (7 d + 2 d d) | per movement the [`Population`] of textures: axes as a whitening of whitened features, in their steps; d variances |
-//! | 4 | M (6 + 2 d) | version 5, per movement the [`Pace`] of slides: mean (i16, 1/1024) and variance of ln(speed), slope of all textures (d i16, 1/256) |
+//! | 4 | M (6 + 2 d) | per movement the [`Pace`] of slides: mean (i16, 1/1024) and variance of ln(speed), slope of all textures (d i16, 1/256) |
 //! | | 2 d T M | per texture and movement: its [`Slope`] |
 //!
 //! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per
@@ -103,9 +99,7 @@ pub use slopes::{Pace, Slopes};
 pub(crate) use slopes::{SlopesView, moved};
 pub use training_stats::{Experience, TrainingStats, Whitened};
 pub use view::Table;
-pub use whitening::{Row, Words};
 pub use whitening::{Slope, Whitening, white};
-pub(crate) use whitening::{dot, fill, products, words};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{Cursor, Read as _};
+use std::io::Read as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -182,62 +182,6 @@ fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
 }
 
 #[test]
-fn an_npz_holds_every_stream_and_a_row_for_each_slide() {
-    let temp = tempfile::tempdir().unwrap();
-    let file = temp.path().join("recordings.npz");
-    convert(Path::new(RECORDINGS), "--npz", &file);
-    let bytes = fs::read(&file).unwrap();
-    let mut npz = zip::ZipArchive::new(Cursor::new(&bytes)).unwrap();
-    let mut array = |name: String| {
-        let mut bytes = Vec::new();
-        npz.by_name(&format!("{name}.npy"))
-            .unwrap()
-            .read_to_end(&mut bytes)
-            .unwrap();
-        bytes
-    };
-    let npy = |bytes: &[u8]| npyz::NpyFile::new(Cursor::new(bytes.to_vec())).unwrap();
-    let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
-    let measured = measure_all(&set, |_| ()).unwrap();
-    let mut row = 0;
-    let properties = array("properties".to_owned());
-    let properties: Vec<f32> = npy(&properties).into_vec().unwrap();
-    for (index, measured) in measured.iter().enumerate() {
-        for (slide, measured) in set.load_texture(index).unwrap().iter().zip(measured) {
-            for (stream, samples) in [
-                ("still", slide.still()),
-                ("pac", slide.pac()),
-                ("pdc", slide.pdc.clone()),
-                ("shear", slide.shear_mn().unwrap()),
-            ] {
-                let there: Vec<i16> = npy(&array(format!("{stream}_{row}"))).into_vec().unwrap();
-                assert_eq!(there, samples);
-            }
-            let told = Property::ALL.map(|p| measured.measurement.properties.get(p).unwrap());
-            assert_eq!(properties[3 * row..][..3], told);
-            row += 1;
-        }
-    }
-    assert_eq!(properties.len(), 3 * row);
-    assert_eq!(npy(&array("movement".to_owned())).shape(), [row as u64, 2]);
-    assert_eq!(npy(&array("texture".to_owned())).shape(), [row as u64]);
-    let again = temp.path().join("again.npz");
-    convert(Path::new(RECORDINGS), "--npz", &again);
-    assert_eq!(fs::read(again).unwrap(), bytes);
-    let names: Vec<&str> = set.textures().iter().map(|t| t.name.as_str()).collect();
-    python(
-        "import sys, numpy
-a = numpy.load(sys.argv[1])
-assert sorted(set(a['texture'])) == sorted(sys.argv[2].split('|')), a['texture']
-assert a['pac_0'].dtype == numpy.int16 and len(a['pac_0']) > 2200
-assert a['properties'].shape == (len(a['texture']), 3)
-assert numpy.isfinite(a['ln_bands']).all()",
-        &[text(&file), &names.join("|")],
-        "numpy",
-    );
-}
-
-#[test]
 fn files_go_through_pipes() {
     let temp = tempfile::tempdir().unwrap();
     let (log, _) = session(temp.path());
@@ -257,24 +201,12 @@ fn files_go_through_pipes() {
             .collect::<Vec<_>>()
     };
     assert_eq!(of(&piped.stdout), of(&fs::read(&file).unwrap()));
-    let npz = temp.path().join("recordings.npz");
-    convert(Path::new(RECORDINGS), "--npz", &npz);
-    let piped = tactus(&["convert", RECORDINGS, "--npz", "-"]);
-    assert!(piped.stdout == fs::read(&npz).unwrap());
-    let two = tactus(&["convert", RECORDINGS, "--npz", "-", "--mcap", "-"]);
-    assert_eq!(two.status.code(), Some(2));
-    assert!(two.stdout.is_empty());
 }
 
 #[test]
 fn what_cannot_be_converted_is_told() {
     let temp = tempfile::tempdir().unwrap();
-    let (log, _) = session(temp.path());
     let to = temp.path().join("there");
-    let of_a_log = tactus(&["convert", text(&log), "--npz", text(&to)]);
-    assert_eq!(of_a_log.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&of_a_log.stderr).contains("--mcap"));
-    assert!(!to.exists());
     fs::write(&to, "mine").unwrap();
     let over = tactus(&["convert", RECORDINGS, "--mcap", text(&to)]);
     assert_eq!(over.status.code(), Some(1));

@@ -23,7 +23,7 @@ use std::sync::mpsc::{self, Receiver as Told, Sender};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
 
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
 use tactus_core::probe::seams::{Panel, RigHandle as _};
@@ -678,12 +678,10 @@ fn teaching_and_calibrating_do_what_was_meant() {
         &["forget", "-y", "--training", "a"],
         wire::Command::Forget(Forget::Training(name("a"))),
     );
-    for flag in ["--self-learned", "--self-taught"] {
-        last(
-            &["forget", "--yes", flag],
-            wire::Command::Forget(Forget::SelfLearned),
-        );
-    }
+    last(
+        &["forget", "--yes", "--self-learned"],
+        wire::Command::Forget(Forget::SelfLearned),
+    );
     last(&["home"], wire::Command::Home);
     last(&["stop"], wire::Command::Stop);
     assert_says(

@@ -22,7 +22,7 @@ macro_rules! examples {
                     found += 1;
                 }
             }
-            assert!(found >= 10);
+            assert!(found >= 8);
         }
 
         mod started {
@@ -43,8 +43,6 @@ examples! {
     next_movement "../../shared/examples/next_movement.rs";
     novelty "../../shared/examples/novelty.rs";
     your_own_rig "../../shared/examples/your_own_rig.rs";
-    plot_posterior "../../host-tools/cli/examples/plot_posterior.rs";
     read_recordings "../../host-tools/cli/examples/read_recordings.rs";
-    simulate_texture "../../host-tools/cli/examples/simulate_texture.rs";
     talk_to_a_probe "../../host-tools/cli/examples/talk_to_a_probe.rs";
 }

@@ -307,8 +307,8 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
         let named: Vec<String> = text
             .lines()
             .map(|line| {
-                line.strip_suffix(",,,,biotac,,")
-                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,,"))
+                line.strip_suffix(",,,,biotac,,,1")
+                    .map_or(line.to_owned(), |l| format!("{l},{name},,,biotac,,,1"))
             })
             .collect();
         std::fs::write(&manifest, named.join("\n")).unwrap();
@@ -346,7 +346,7 @@ fn a_gauge_study_is_one_object_and_compares_operators_of_several_folders() {
 }
 
 #[test]
-fn an_evaluation_says_how_reliable_it_is_and_what_another_threshold_would_give() {
+fn an_evaluation_says_how_reliable_it_is() {
     let evaluate = ["evaluate", "--recordings", SIMULATED, "--train-slides", "2"];
     let options = ["--runs", "60", "--threshold", "0.97", "--format", "json"];
     let found = json(&[&evaluate[..], &options].concat(), 0);
@@ -372,19 +372,6 @@ fn an_evaluation_says_how_reliable_it_is_and_what_another_threshold_would_give()
     // one statement after each slide until the answer
     let told = number(&found["mean_slides_told"]);
     assert!((slides / 60.0 - told).abs() < 1e-9, "{slides} {told}");
-
-    let by_threshold = list("by_threshold");
-    let used = by_threshold
-        .iter()
-        .find(|at| (number(&at["threshold"]) - 0.97).abs() < 1e-6)
-        .unwrap();
-    assert_eq!(used["verdicts"], found["verdicts"]);
-    assert!((number(&used["mean_slides"]) - told).abs() < 1e-9);
-    assert!(
-        by_threshold
-            .windows(2)
-            .all(|pair| number(&pair[0]["mean_slides"]) <= number(&pair[1]["mean_slides"]))
-    );
 }
 
 #[test]

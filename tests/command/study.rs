@@ -24,7 +24,6 @@ use tactus_study::slides::{
 };
 use tactus_study::training::{Training, Worn};
 use tactus_study::{Study, VARIATION};
-use tactus_tests::skipped;
 use tactus_world::TRIAL_VARIATION;
 
 const MOVEMENTS: [Movement; 3] = [
@@ -157,7 +156,7 @@ fn every_file_is_the_same_on_any_number_of_threads() {
         let folder = on_threads(threads, || written(&study(160)));
         files(folder.path())
     });
-    assert!(one.len() > 50, "{} files", one.len());
+    assert!(one.len() > 2, "{} files", one.len());
     for (one, two) in one.iter().zip(&two) {
         assert_eq!(one.0, two.0);
         assert!(one.1 == two.1, "{} differs", one.0);
@@ -315,8 +314,8 @@ fn a_movement_that_is_not_reached_is_a_result() {
         .into_iter()
         .map(|(_, bytes)| String::from_utf8_lossy(&bytes).into_owned());
     let naming = said.filter(|text| text.contains("not reached: T30, trial 3: lever slips"));
-    // the page and the table of movements
-    assert_eq!(naming.count(), 2);
+    // the page
+    assert_eq!(naming.count(), 1);
     let json: serde_json::Value = serde_json::from_str(&report::json(&study).unwrap()).unwrap();
     let missed = &json["pilot"]["movements"][30]["not_reached"][0];
     assert_eq!(
@@ -469,76 +468,6 @@ fn a_press_gives_the_papers_line() {
     assert!((2.4..2.7).contains(&most), "{most} N");
 }
 
-/// The fields of a table's file.
-fn rows(folder: &Path, table: &str) -> Vec<Vec<String>> {
-    let mut reader = csv::Reader::from_path(folder.join(format!("tables/{table}.csv"))).unwrap();
-    let header = reader.headers().unwrap().clone();
-    std::iter::once(Ok(header))
-        .chain(reader.into_records())
-        .map(|row| row.unwrap().iter().map(str::to_owned).collect())
-        .collect()
-}
-
-#[test]
-fn csv_and_json_have_the_same_numbers() {
-    let folder = written(shared());
-    let folder = folder.path();
-    let text = fs::read_to_string(folder.join("study.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let same = |field: &str, value: &serde_json::Value| {
-        let (file, value) = (field.parse::<f64>().unwrap(), value.as_f64().unwrap());
-        // serde_json reads to the last digit but one
-        assert!(
-            (file - value).abs() <= 1e-15 * value.abs(),
-            "{field} {value}"
-        );
-    };
-
-    let table5 = rows(folder, "table5-identification");
-    for (place, column) in [(2, 0), (4, 1), (6, 2), (7, 3)] {
-        let ours = &json["identification"]["columns"][column];
-        same(&table5[1][place], &ours["correct"]);
-        same(&table5[2][place], &ours["converged"]);
-        same(&table5[4][place], &ours["median"]);
-        for texture in 0..16 {
-            same(&table5[6 + texture][place], &ours["textures"][texture]);
-        }
-    }
-    assert_eq!(
-        [&table5[1][1], &table5[1][3], &table5[1][5]],
-        ["49.9", "84.1", "95.4"]
-    );
-
-    let table4 = rows(folder, "table4-pairs");
-    for (row, pair) in table4[1..9].iter().zip(json["pairs"].as_array().unwrap()) {
-        same(&row[1], &pair["paper"][0]);
-        same(&row[2], &pair["paper"][1]);
-        same(&row[3], &pair["correct"]);
-    }
-    let matrix = rows(folder, "confusion-2-fineness");
-    let of = json["training"]["confusion"].as_array().unwrap();
-    let of = of
-        .iter()
-        .find(|c| c["movement"] == 1 && c["property"] == "Fineness")
-        .unwrap();
-    for (row, of) in matrix[1..].iter().zip(of["matrix"].as_array().unwrap()) {
-        row.iter()
-            .zip(of.as_array().unwrap())
-            .for_each(|(f, v)| same(f, v));
-    }
-    let movements = rows(folder, "movements");
-    for (row, of) in movements[1..]
-        .iter()
-        .zip(json["pilot"]["movements"].as_array().unwrap())
-    {
-        same(&row[0], &of["force_n"]);
-        same(&row[4], &of["wear"]);
-        same(&row[7], &of["uncertainty"][2]);
-    }
-    assert_eq!(json["seed"], 5);
-    assert_eq!(json["version"], "0.0.0-test");
-}
-
 /// Every figure of the paper that the study makes, by what its file's name begins with.
 const FIGURES: [&str; 9] = [
     "fig3",
@@ -596,7 +525,7 @@ fn the_page_is_whole() {
     let style = style.text().unwrap();
     assert!(style.contains("@media print") && style.contains("max-width:600px"));
 
-    // every figure: in the page and as a file, with words on both axes
+    // every figure, with words on both axes
     let panels: Vec<_> = elements()
         .filter(|n| n.attribute("class") == Some("panel"))
         .collect();
@@ -644,18 +573,8 @@ fn the_page_is_whole() {
             !words.contains("NaN") && !words.contains("inf"),
             "{id}: {words}"
         );
-        let name = id.strip_prefix("figure-").unwrap();
-        let file = fs::read_to_string(folder.path().join(format!("figures/{name}.svg"))).unwrap();
-        roxmltree::Document::parse(&file).unwrap();
-        assert!(
-            page.contains(&file["<svg ".len()..]),
-            "{id} is another one in its file"
-        );
     }
-    let figures = fs::read_dir(folder.path().join("figures")).unwrap().count();
-    assert_eq!(figures, panels.len());
-
-    // every table: rows as long as the header, a caption, a file
+    // every table: rows as long as the header, and a caption
     let tables: Vec<_> = elements()
         .filter(|n| n.tag_name().name() == "table")
         .collect();
@@ -692,55 +611,6 @@ fn the_page_is_whole() {
     ] {
         assert!(words.contains(said), "{said}");
     }
-}
-
-#[test]
-fn a_browser_shows_all_of_it_without_a_complaint() {
-    let browsers = ["chromium", "chromium-browser", "google-chrome"];
-    let found = browsers.into_iter().find(|browser| {
-        let version = Command::new(browser).arg("--version").output();
-        version.is_ok_and(|out| out.status.success())
-    });
-    let Some(browser) = found else {
-        return skipped("no Chromium (apt-get install chromium); the report was not opened");
-    };
-    let folder = written(shared());
-    let home = tempfile::tempdir().unwrap();
-    let shown = Command::new(browser)
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-logging=stderr",
-            "--dump-dom",
-        ])
-        .arg(format!("--user-data-dir={}", home.path().display()))
-        .arg(format!(
-            "file://{}",
-            folder.path().join("report.html").display()
-        ))
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&shown.stderr);
-    let complaints: Vec<&str> = said
-        .lines()
-        .filter(|line| line.contains("CONSOLE"))
-        .collect();
-    assert!(
-        shown.status.success() && complaints.is_empty(),
-        "{complaints:#?}"
-    );
-    let dom = String::from_utf8(shown.stdout).unwrap();
-    let figures = fs::read_dir(folder.path().join("figures")).unwrap();
-    for figure in figures {
-        let name = figure.unwrap().file_name().into_string().unwrap();
-        let id = format!("id=\"figure-{}\"", name.strip_suffix(".svg").unwrap());
-        assert!(dom.contains(&id), "{name} is not shown");
-    }
-    assert_eq!(
-        dom.matches("<svg").count(),
-        fs::read_dir(folder.path().join("figures")).unwrap().count()
-    );
 }
 
 fn complaint(arguments: &[&str], code: i32) -> String {

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, PropertySet};
 use tactus_core::probe::explore::{ExplorationStep, explore};
@@ -215,7 +215,7 @@ fn a_probe_says_when_a_slide_ended_and_learns_nothing_from_it() {
         let flash = RamFlash::blank();
         let mut probe = switch_on(rig, flash, &bytes, &mut buffer, &plan, &heard).unwrap();
         let asked = Identify::default();
-        block_on(probe.perform::<Plain>(&Command::Identify(asked.clone()))).unwrap();
+        block_on(probe.perform(&Command::Identify(asked.clone()))).unwrap();
         let heard = heard.take().0;
         // the same samples say the same on a PC, the end of the slide included
         let mut follower = Follower::new(table, PropertySet::ALL, &asked, &plan).unwrap();

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use tactus_core::explorer::{Config, Method, Told};
 use tactus_core::features::Property;
 use tactus_core::features::{FeatureSet, Observation};
-use tactus_core::table::MAX_MOVEMENTS;
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::measure_all;
@@ -121,7 +120,6 @@ impl Oracle {
                     sure,
                     told: told(sure),
                     slides,
-                    made: [0; MAX_MOVEMENTS],
                     unknown_like: false,
                 };
             }
@@ -168,7 +166,6 @@ fn explore_fused(
                 sure,
                 told: told(sure),
                 slides: episode.slides() as u8,
-                made: [0; MAX_MOVEMENTS],
                 unknown_like: episode.novel(trained),
             };
         }

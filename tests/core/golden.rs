@@ -159,7 +159,7 @@ fn spectra_of_made_up_signals_are_those_of_f64() {
             })
             .collect();
         let mut sum = tactus_core::dsp::SpectrumSum::default();
-        sum.push::<tactus_core::dsp::Plain>(&tactus_core::dsp::angles(), &samples);
+        sum.push(&tactus_core::dsp::Plan::new(), &samples);
         assert_near_oracle(
             &samples,
             &sum.finish().unwrap(),

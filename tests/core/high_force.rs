@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Properties, Property, PropertySet};
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Refused, RigError};
@@ -57,7 +57,7 @@ impl Host for Heard {
 }
 
 fn ask(probe: &mut SimProbe<'_, Heard>, command: Command) -> Result<(), Box<Failure>> {
-    block_on(probe.perform::<Plain>(&command)).map_err(Box::new)
+    block_on(probe.perform(&command)).map_err(Box::new)
 }
 
 fn train() -> Command {

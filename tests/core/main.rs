@@ -9,6 +9,7 @@ mod fault_cases;
 mod faults;
 mod figures;
 mod fixed_point;
+mod formats;
 mod fused_recipe;
 mod golden;
 mod high_force;

@@ -1,10 +1,9 @@
 //! Hands that do not hold their speed, with a sensor of it, without one, and with one that has lost track, in the simulated world.
 
 use rayon::prelude::*;
-use tactus_core::dsp::Plain;
-use tactus_core::explorer::{Method, Told};
+use tactus_core::explorer::Method;
 use tactus_core::features::Observation;
-use tactus_core::handheld::{ASK_AFTER, FEATURES, Judgement, MOVEMENT, judge_at_most};
+use tactus_core::handheld::{ASK_AFTER, FEATURES, MOVEMENT, judge_at_most};
 use tactus_core::table::Table;
 use tactus_lab::eval::learn;
 use tactus_lab::sim::collection::Collection;
@@ -36,74 +35,30 @@ fn without_speed(slides: &[Observation]) -> Vec<Observation> {
     .collect()
 }
 
-/// How explorations ended.
+/// Explorations, and those of which the first slide was most like the right texture.
 #[derive(Clone, Copy, Default)]
 struct Counts {
     explored: usize,
-    right_after_one: usize,
-    slides: usize,
     right: usize,
-    wrong: usize,
-    new: usize,
-    changed: usize,
 }
 
 impl Counts {
     fn add(&mut self, other: Self) {
         self.explored += other.explored;
-        self.right_after_one += other.right_after_one;
-        self.slides += other.slides;
         self.right += other.right;
-        self.wrong += other.wrong;
-        self.new += other.new;
-        self.changed += other.changed;
     }
 
-    fn share(&self, of: usize) -> f64 {
-        100.0 * of as f64 / self.explored as f64
-    }
-
-    fn row(&self, what: &str) -> String {
-        let [one, right, wrong, new, changed] = [
-            self.right_after_one,
-            self.right,
-            self.wrong,
-            self.new,
-            self.changed,
-        ]
-        .map(|count| self.share(count));
-        let slides = self.slides as f64 / self.explored as f64;
-        format!(
-            "{what} | {one:.1} | {right:.1} | {slides:.2} | {wrong:.2} | {new:.1} | {changed:.1}"
-        )
+    fn percent(&self) -> f64 {
+        100.0 * self.right as f64 / self.explored as f64
     }
 }
 
-/// Explores one texture.
+/// Explores one texture by one slide.
 fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
-    let judged = |n: usize| {
-        judge_at_most::<Plain>(table, &slides[..n], None, None, ASK_AFTER)
-            .unwrap()
-            .0
-    };
-    let leads = |judged: &Judgement| judged.leading[0].0 == is;
-    let first = judged(1);
-    let mut all = (1..=ASK_AFTER).map(|n| (n, judged(n)));
-    let (n, last) = all.find(|(_, judged)| !judged.open).unwrap();
-    let told = match &last {
-        last if last.unknown => Told::New,
-        last if last.changed => Told::Changed,
-        last if last.sure => Told::Sure,
-        _ => Told::Undecided,
-    };
+    let judged = judge_at_most(table, &slides[..1], None, None, ASK_AFTER).unwrap();
     Counts {
         explored: 1,
-        right_after_one: leads(&first).into(),
-        slides: n,
-        right: (told == Told::Sure && leads(&last)).into(),
-        wrong: (told == Told::Sure && !leads(&last)).into(),
-        new: (told == Told::New).into(),
-        changed: (told == Told::Changed).into(),
+        right: (judged.0.leading[0].0 == is).into(),
     }
 }
 
@@ -157,41 +112,10 @@ fn a_sensor_of_speed_tells_more_and_its_loss_costs_nothing() {
         let counts = world(seed, &textures, hand(0.25, 0.20));
         sums.iter_mut().zip(counts).for_each(|(sum, c)| sum.add(c));
     }
-    let [without, with, lost] = sums.map(|counts| counts.share(counts.right_after_one));
+    let [without, with, lost] = sums.map(|counts| counts.percent());
     println!(
         "right after one slide: {without:.1} %, {with:.1} % with the sensor, {lost:.1} % when lost"
     );
     assert!(with > without, "{without} {with}");
     assert!(lost > without - 2.0, "{without} {lost}");
-}
-
-/// A number from the environment.
-fn setting(name: &str, usual: usize) -> usize {
-    std::env::var(name).map_or(usual, |number| number.parse().unwrap())
-}
-
-/// `PACE_SEEDS` worlds, 50 unless given, and every so-manieth texture of each, `PACE_EVERY`, 5 unless given.
-#[test]
-#[ignore = "the book's figures: half an hour"]
-fn hands_of_three_spreads() {
-    let textures: Vec<u8> = (1..=117).step_by(setting("PACE_EVERY", 5)).collect();
-    let seeds = setting("PACE_SEEDS", 50) as u64;
-    println!(
-        "spread | sensor | right after one slide | right | slides | wrong and sure | new | changed"
-    );
-    for (pace, force) in [(0.25, 0.20), (0.12, 0.10), (0.40, 0.30)] {
-        let mut sums = [Counts::default(); 3];
-        for seed in 1..=seeds {
-            let counts = world(seed, &textures, hand(pace, force));
-            sums.iter_mut().zip(counts).for_each(|(sum, c)| sum.add(c));
-        }
-        for (sensor, counts) in ["none", "on", "lost"].iter().zip(sums) {
-            let row = counts.row(sensor);
-            println!(
-                "{:.0} % | {row} ({} explorations)",
-                100.0 * pace,
-                counts.explored
-            );
-        }
-    }
 }

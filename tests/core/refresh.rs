@@ -2,7 +2,7 @@
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method, Told};
 use tactus_core::features::{Observation, PropertySet, Slide};
 use tactus_core::probe::explore::explore;
@@ -80,7 +80,7 @@ fn slides(world: &Collection, table: Table<'_>, finger: Finger, count: usize) ->
         let movements = (0..).zip(table.movements());
         let movements = movements.flat_map(|at| std::iter::repeat_n(at, count));
         let made = movements.map(|(index, movement)| {
-            let mut slide = Slide::<Plain>::new(&plan, movement);
+            let mut slide = Slide::new(&plan, movement);
             block_on(rig.perform(&mut slide)).unwrap();
             let observation = Observation::from(&slide.finish().unwrap());
             NewSlide {

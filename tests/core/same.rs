@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use embassy_futures::block_on;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Answer, ExplorerError, Method, Strategy};
 use tactus_core::probe::TableInUse;
 use tactus_core::rig::calibration::RigCalibration;
@@ -70,7 +70,7 @@ fn ask(
     let mut probe = probe.unwrap();
     let asked = commands.iter().map(|command| {
         *heard.borrow_mut() = Heard::default();
-        let done = block_on(probe.perform::<Plain>(command));
+        let done = block_on(probe.perform(command));
         (done, heard.take())
     });
     asked.collect()
@@ -204,7 +204,7 @@ fn a_probe_set_to_more_false_alarms_calls_more_textures_new() {
     let flash = RamFlash::blank();
     let mut probe = switch_on(rig, flash, &known.1, &mut buffer, &plan, &heard).unwrap();
     for set in [None, Some(0.005), Some(0.1), None] {
-        block_on(probe.perform::<Plain>(&Command::SetFalseAlarm(set))).unwrap();
+        block_on(probe.perform(&Command::SetFalseAlarm(set))).unwrap();
         assert_eq!(heard.borrow().false_alarm, set);
         heard.borrow_mut().false_alarm = Some(0.2);
         probe = switch_off_and_on(probe).unwrap();

@@ -4,7 +4,7 @@ use embassy_futures::block_on;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Blocks, Measurement, Movement, Property, PropertySet, Slide};
 use tactus_core::probe::explore::{ExplorationStep, explore};
@@ -151,7 +151,7 @@ fn a_recorded_slide_has_the_properties_measured_live() {
     let plan = Plan::new();
     let mut rig = SimRig::new(setup);
     rig.control().calibrate(calibration).unwrap();
-    let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+    let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
     block_on(rig.perform(&mut slide)).unwrap();
     assert_eq!(slide.finish().unwrap(), recorded);
 }
@@ -275,7 +275,7 @@ fn traction_is_the_shear_that_really_acts() {
         let slide = {
             rig.control().start(Movement::FOR_TRACTION, 0.5).unwrap();
             let plan = Plan::new();
-            let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_TRACTION);
+            let mut slide = Slide::new(&plan, Movement::FOR_TRACTION);
             let mut blocks = Blocks::default();
             while rig.control().phase() != Phase::Ready {
                 let Outputs {

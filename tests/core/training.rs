@@ -1,7 +1,6 @@
 //! Training on the simulated rig: with the power cut after any trial, what is learned is the same.
 
 use embassy_futures::block_on;
-use tactus_core::dsp::Plain;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::Movement;
@@ -48,7 +47,7 @@ fn slides(
     rig.control().calibrate(calibration).unwrap();
     let mut observed = Vec::new();
     while let Some(movement) = training.next() {
-        let mut slide = Slide::<Plain>::new(&plan, movement);
+        let mut slide = Slide::new(&plan, movement);
         block_on(rig.perform(&mut slide)).unwrap();
         let observation = Observation::from(&slide.finish().unwrap());
         training.took(Some(table), movement, &observation).unwrap();

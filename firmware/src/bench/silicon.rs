@@ -16,104 +16,27 @@ use embassy_stm32::{peripherals, rcc};
 use embassy_time::Timer;
 use heapless::Vec;
 use static_cell::{ConstStaticCell, StaticCell};
-use tactus_core::dsp::{Plain, Plan};
-use tactus_core::explorer::{Kernels, Method};
-use tactus_core::features::{Movement, Observation, Properties, Property, PropertySet};
+use tactus_core::dsp::Plan;
 use tactus_core::sensor::pressure::{RATE_HZ, SLOTS_HZ};
-use tactus_core::table::{Action, Experience, Table, Texture, encode, factory};
 
-use super::workload::{Counter, ObservedSlide, Workload, run};
+use super::workload::{Counter, Workload, run};
 use super::{Cycles, bench, is_wanted};
 use crate::board;
-use crate::chip::Chip;
+use crate::chip::KERNELS;
 use crate::chip::current::{CONVERSIONS, Current};
 
 const CORE_HZ: u32 = 168_000_000;
 
-/// The table of features, as it comes with the rig.
-static FUSED: &[u8] = factory::RIG;
-/// Textures of a table of Gaussians, which the chip makes itself.
-const NAMES: [&str; 24] = [
-    "a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r", "s",
-    "t", "u", "v", "w", "x",
-];
-const MOVEMENTS: [Movement; 3] = [
-    Movement::FOR_TRACTION,
-    Movement::FOR_FINENESS,
-    Movement::FOR_ROUGHNESS,
-];
-const GAUSSIANS: usize = 4096;
-
-/// Samples of a slide of 3 s, and an observed slide before them.
+/// Samples of a slide of 3 s.
 const SAMPLES: usize = 3 * RATE_HZ as usize;
-type Words = Vec<i16, { SAMPLES + 64 }>;
+type Words = Vec<i16, SAMPLES>;
 const RESULTS: usize = 4096;
 
-/// What is done, and the cycles that it takes by the emulator's model (the test `silicon_image` of the emulated board keeps it true).
-const CASES: [(&str, Workload, Option<Method>, u32); 13] = [
-    ("band power", Workload::BandPower, None, 503_092),
-    ("frame", Workload::Frame, None, 32_178),
-    ("slide", Workload::Slide, None, 1_439_013),
-    (
-        "begin, paper",
-        Workload::Begin,
-        Some(Method::Paper),
-        272_199,
-    ),
-    (
-        "first choice, paper",
-        Workload::FirstChoice,
-        Some(Method::Paper),
-        1786,
-    ),
-    (
-        "posterior, paper",
-        Workload::Observe,
-        Some(Method::Paper),
-        4494,
-    ),
-    (
-        "choice, paper",
-        Workload::Choice,
-        Some(Method::Paper),
-        38_227,
-    ),
-    (
-        "decision, paper",
-        Workload::Decision,
-        Some(Method::Paper),
-        102_575,
-    ),
-    (
-        "begin, fused",
-        Workload::Begin,
-        Some(Method::Fused),
-        845_147,
-    ),
-    (
-        "first choice, fused",
-        Workload::FirstChoice,
-        Some(Method::Fused),
-        904,
-    ),
-    (
-        "posterior, fused",
-        Workload::Observe,
-        Some(Method::Fused),
-        35_657,
-    ),
-    (
-        "choice, fused",
-        Workload::Choice,
-        Some(Method::Fused),
-        76_465,
-    ),
-    (
-        "decision, fused",
-        Workload::Decision,
-        Some(Method::Fused),
-        172_340,
-    ),
+/// The work, and the cycles that it takes by the emulator's model (the test `silicon_image` of the emulated board keeps it true).
+const CASES: [(&str, Workload, u32); 3] = [
+    ("band power", Workload::BandPower, 503_092),
+    ("frame", Workload::Frame, 32_178),
+    ("slide", Workload::Slide, 1_439_013),
 ];
 /// A kernel may take so many per cent of what the model says: what the model lacks is to be seen, not to be judged.
 const MODEL_PERCENT: u32 = 130;
@@ -228,12 +151,11 @@ impl Output {
         }
     }
 
-    /// Runs a workload with these kernels; `None` if its words make no sense, or there are no results.
-    fn run<K: Kernels>(
+    /// Runs a workload with the kernels of a plan; `None` if there are no results.
+    fn run(
         &mut self,
         workload: Workload,
         plan: &Plan,
-        table: &[u8],
         words: &[i16],
         counter: &mut impl Counter,
     ) -> Option<&[u8]> {
@@ -245,7 +167,7 @@ impl Output {
             }
             *length += bytes.len();
         };
-        run::<K>(workload, plan, table, words, counter, &mut put)?;
+        run(workload, plan, &[], words, counter, &mut put)?;
         self.bytes
             .get(..self.length)
             .filter(|bytes| !bytes.is_empty())
@@ -254,34 +176,18 @@ impl Output {
 
 /// Each workload by the chip's kernels and by the plain ones: the same bytes, in no more cycles than the model allows.
 fn kernels(results: &mut Results) {
-    static PLAN: StaticCell<Plan> = StaticCell::new();
+    static PLANS: StaticCell<[Plan; 2]> = StaticCell::new();
     static WORDS: ConstStaticCell<Words> = ConstStaticCell::new(Words::new());
-    static GAUSSIAN: ConstStaticCell<[u8; GAUSSIANS]> = ConstStaticCell::new([0; GAUSSIANS]);
     static OUTPUTS: ConstStaticCell<[Output; 2]> =
         ConstStaticCell::new([const { Output::new() }; 2]);
-    let plan = PLAN.init_with(Plan::new);
+    let [plan, plain_plan] = PLANS.init_with(|| [Plan::with(KERNELS), Plan::new()]);
     let words = WORDS.take();
-    let paper = gaussians(GAUSSIAN.take()).map_or(&[][..], |table| table.as_bytes());
+    slide(words);
     let [chips, plains] = OUTPUTS.take();
-    for (name, workload, method, modelled) in CASES {
-        let table = match method {
-            Some(Method::Paper) => paper,
-            Some(_) => FUSED,
-            None => &[],
-        };
-        words.clear();
-        if let Some(method) = method
-            && observed(table, method, words).is_none()
-        {
-            results.check(false, name, "no slide of its table");
-            continue;
-        }
-        slide(words);
+    for (name, workload, modelled) in CASES {
         let mut cycles = Cycles(0);
-        let chip = cortex_m::interrupt::free(|_| {
-            chips.run::<Chip>(workload, plan, table, words, &mut cycles)
-        });
-        let plain = plains.run::<Plain>(workload, plan, table, words, &mut Uncounted);
+        let chip = cortex_m::interrupt::free(|_| chips.run(workload, plan, words, &mut cycles));
+        let plain = plains.run(workload, plain_plan, words, &mut Uncounted);
         let is_equal = chip.is_some() && chip == plain;
         let bytes = chip.map_or(0, <[u8]>::len);
         let whose = if is_equal { "as" } else { "other than" };
@@ -318,74 +224,6 @@ fn slide(words: &mut Words) {
         // there is room for all
         let _ = words.push(triangle + noise.next(60));
     }
-}
-
-/// A table of Gaussians that lie close to one another, each learned from four trials.
-fn gaussians(bytes: &mut [u8; GAUSSIANS]) -> Option<Table<'_>> {
-    let mut noise = Noise(2);
-    let mut around = |centre: i16, reach: i16| f32::from(centre + noise.next(reach)) / 100.0;
-    let mut learned: Vec<[Experience; MOVEMENTS.len()], { NAMES.len() }> = Vec::new();
-    for _ in NAMES {
-        let mut of_movements = [Experience::default(); MOVEMENTS.len()];
-        for experience in &mut of_movements {
-            let centre = [(100, 60), (800, 200), (400, 80)].map(|(c, reach)| around(c, reach));
-            for _ in 0..4 {
-                let trial = centre.map(|c| Some(c + around(0, 15)));
-                experience
-                    .learn(PropertySet::ALL, &Properties::new(trial))
-                    .ok()?;
-            }
-        }
-        learned.push(of_movements).ok()?;
-    }
-    let textures = NAMES.iter().zip(&learned);
-    let textures = textures.map(|(name, experience)| Texture { name, experience });
-    encode(bytes, PropertySet::ALL, &MOVEMENTS, textures).ok()
-}
-
-/// Adds a slide in the middle of a table, looked at by a method.
-fn observed(table: &[u8], method: Method, words: &mut Words) -> Option<()> {
-    let table = Table::read(table).ok()?;
-    let (property, slide) = if method == Method::Paper {
-        let values = Property::ALL.map(|property| {
-            let property = Some(property);
-            let looked_at = Action {
-                movement: 0,
-                property,
-            };
-            Some(table.gaussian(NAMES.len() as u16 / 2, looked_at)?.mean)
-        });
-        (Some(Property::Roughness), Properties::new(values).into())
-    } else {
-        // the whitening begins with the features' means: traction, and the bands
-        let whitening = table.whitening(0)?;
-        let (features, _) = whitening.as_bytes().as_chunks();
-        let mut features = features.iter().map(|pair| i16::from_le_bytes(*pair));
-        let traction = f32::from(features.next()?) / 1024.0;
-        let properties = Properties::new([Some(traction), Some(8.0), Some(4.0)]);
-        let bands = features.take(whitening.features() - 1).collect();
-        let slide = Observation {
-            properties,
-            bands,
-            pressure: None,
-            pace: None,
-        };
-        (None, slide)
-    };
-    let action = Action {
-        movement: 0,
-        property,
-    };
-    let observed = ObservedSlide {
-        method,
-        action,
-        slide,
-    };
-    observed.write(|word| {
-        // there is room for all
-        let _ = words.push(word);
-    });
-    Some(())
 }
 
 /// Cycles of the core until something has happened so many times; `None` if it takes too long.

@@ -5,10 +5,9 @@ use core::hint::black_box;
 
 use heapless::Vec;
 use tactus_core::dsp::{BandPower, FRAME, HOP, Plan, SpectrumSum};
-use tactus_core::explorer::kernels::Candidate;
-use tactus_core::explorer::{Config, Explorer, Kernels, Method};
+use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{
-    BLOCK, Block, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet, Slide,
+    BLOCK, Block, Movement, Observation, Properties, Property, PropertySet, Slide,
 };
 use tactus_core::sensor::pressure::RATE_HZ;
 use tactus_core::table::{Action, Table};
@@ -41,15 +40,13 @@ pub enum Workload {
     Choice,
     /// From the last sample of a slide to the next choice.
     Decision,
-    /// Confusion of the first of some whitened means with the others, all learned from as many slides.
-    Confuse,
     /// A look at the first part of a slide, by the shortest length that the table knows.
     Look,
 }
 
 impl Workload {
     /// All, by their codes.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 10] = [
         Self::Nothing,
         Self::BandPower,
         Self::Frame,
@@ -59,7 +56,6 @@ impl Workload {
         Self::Observe,
         Self::Choice,
         Self::Decision,
-        Self::Confuse,
         Self::Look,
     ];
 }
@@ -139,7 +135,7 @@ impl ObservedSlide {
 
 /// Runs a workload on the samples or the observed slide in `words`, which the background precedes, and writes its results;
 /// `None` if the words make no sense.
-pub fn run<K: Kernels>(
+pub fn run(
     workload: Workload,
     plan: &Plan,
     table: &[u8],
@@ -153,23 +149,23 @@ pub fn run<K: Kernels>(
             let mut power = BandPower::default();
             let mean = counter.count(|| {
                 for samples in black_box(words).chunks(BLOCK) {
-                    power.push::<K>(plan.taps(), samples);
+                    power.push(plan, samples);
                 }
-                power.mean::<K>(plan.taps())
+                power.mean(plan)
             });
             put(&mean?.to_le_bytes());
         }
         Workload::Frame => {
             let mut spectrum = SpectrumSum::default();
             let (first, rest) = words.split_at_checked(FRAME - HOP)?;
-            spectrum.push::<K>(plan.angles(), first);
+            spectrum.push(plan, first);
             let frame = rest.get(..HOP)?;
-            counter.count(|| spectrum.push::<K>(plan.angles(), black_box(frame)));
+            counter.count(|| spectrum.push(plan, black_box(frame)));
             let psd = spectrum.finish()?;
             psd.psd().iter().for_each(|p| put(&p.to_le_bytes()));
         }
         Workload::Slide => {
-            let (mut slide, mut block) = slide_of::<K>(plan, words);
+            let (mut slide, mut block) = slide_of(plan, words);
             let observed = counter.count(|| {
                 for samples in black_box(words).chunks(BLOCK) {
                     fill(&mut block, samples);
@@ -179,35 +175,12 @@ pub fn run<K: Kernels>(
             });
             put_observation(&observed.ok()?, put);
         }
-        Workload::Confuse => {
-            let (&slides, means) = words.split_first()?;
-            let slides = u8::try_from(slides).ok()?;
-            let mut all: Vec<Candidate, 64> = means
-                .as_chunks::<MAX_FEATURES>()
-                .0
-                .iter()
-                .zip(1u8..)
-                .map(|(&mean, nth)| {
-                    let squares = mean.iter().map(|m| i32::from(*m).pow(2) as u32);
-                    Candidate {
-                        mean,
-                        square: squares.fold(0, u32::saturating_add),
-                        probability: 1.0 / f32::from(nth),
-                        confused: f32::from(nth),
-                        slides,
-                    }
-                })
-                .collect();
-            let (first, others) = all.split_first_mut()?;
-            counter.count(|| K::confuse_whitened(first, others, slides));
-            all.iter().for_each(|c| put(&c.confused.to_le_bytes()));
-        }
         _ => {
             let table = Table::read(table).ok()?;
             if usize::from(table.textures()) <= CAPACITY {
-                explore::<K, CAPACITY>(workload, plan, table, words, counter, put)?;
+                explore::<CAPACITY>(workload, plan, table, words, counter, put)?;
             } else {
-                explore::<K, MOST_TEXTURES>(workload, plan, table, words, counter, put)?;
+                explore::<MOST_TEXTURES>(workload, plan, table, words, counter, put)?;
             }
         }
     }
@@ -216,7 +189,7 @@ pub fn run<K: Kernels>(
 
 // a stack frame of its own: the frame with the larger buffer would not fit beside any other
 #[inline(never)]
-fn explore<K: Kernels, const N: usize>(
+fn explore<const N: usize>(
     workload: Workload,
     plan: &Plan,
     table: Table<'_>,
@@ -229,13 +202,13 @@ fn explore<K: Kernels, const N: usize>(
         method: observed.method,
         ..Config::default()
     };
-    let begin = || Explorer::<N, K>::new(table, PropertySet::ALL, config);
+    let begin = || Explorer::<N>::new(table, PropertySet::ALL, config);
     let mut explorer = if workload == Workload::Begin {
         counter.count(begin).ok()?
     } else {
         begin().ok()?
     };
-    let choose = |explorer: &Explorer<'_, N, K>| {
+    let choose = |explorer: &Explorer<'_, N>| {
         let mut outcomes = Vec::new();
         explorer.evaluate_actions(&mut outcomes);
         black_box(explorer.choose(black_box(&outcomes), 0))
@@ -262,7 +235,7 @@ fn explore<K: Kernels, const N: usize>(
             Some(counter.count(|| choose(black_box(&explorer))))
         }
         Workload::Decision => {
-            let (mut slide, mut block) = slide_of::<K>(plan, samples);
+            let (mut slide, mut block) = slide_of(plan, samples);
             let mut rest = samples.chunks(BLOCK);
             let last = rest.next_back()?;
             for samples in rest {
@@ -299,7 +272,7 @@ fn explore<K: Kernels, const N: usize>(
 }
 
 /// The slide of so many samples, all at constant speed, after its first block, which has none.
-fn slide_of<'p, K: Kernels>(plan: &'p Plan, samples: &[i16]) -> (Slide<'p, K>, Block) {
+fn slide_of<'p>(plan: &'p Plan, samples: &[i16]) -> (Slide<'p>, Block) {
     let mut slide = Slide::new(plan, Movement::FOR_TRACTION);
     slide.set_background(2.0);
     let mut block = Block {

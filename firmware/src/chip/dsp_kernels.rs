@@ -1,11 +1,11 @@
-//! The inner loops of a slide for this chip. Their plain twins are `tactus_core::dsp::Plain`: `cargo xtask bench` compares
-//! them, to the bit.
+//! The inner loops of a slide for this chip. Their plain twins are `tactus_core::dsp::Kernels::PLAIN`: `cargo xtask bench`
+//! compares them, to the bit.
 
 use core::arch::{asm, global_asm};
 use core::mem::MaybeUninit;
 
 use tactus_core::dsp::{
-    Angles, Complex32, FRAME, Folded, HALVES, HalfFilters, Kernels, Plain, Reals, TAPS, Taps,
+    Angles, Complex32, FRAME, Folded, HALVES, HalfFilters, Kernels, TAPS, Taps,
 };
 
 use super::transform_kernel;
@@ -197,12 +197,12 @@ unsafe extern "C" {
     fn tactus_halve(samples: *const i16, words: *mut [u32; 3], fours: usize);
 }
 
-/// [`Kernels::clip`] of a multiple of 4 samples, not 0.
+/// [`clip`] of a multiple of 4 samples, not 0.
 ///
 /// # Safety
 /// They are there, as many in both.
 #[inline(never)]
-unsafe fn clip(samples: *const i16, clipped: *mut i16, many: usize) {
+unsafe fn clip_fours(samples: *const i16, clipped: *mut i16, many: usize) {
     // SAFETY: it reads and writes as many; words need not be aligned.
     unsafe {
         asm!(
@@ -225,7 +225,7 @@ unsafe fn clip(samples: *const i16, clipped: *mut i16, many: usize) {
     }
 }
 
-/// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what `Plain` does, in its
+/// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what the plain one does, in its
 /// order (VMLA rounds the product).
 #[inline(never)]
 fn fold_frame<'r>(
@@ -311,12 +311,17 @@ fn fold_frame<'r>(
     }
 }
 
-/// [`Kernels::fold`] of so many in both, a multiple of 4.
+/// [`fold`] of so many in both, a multiple of 4.
 ///
 /// # Safety
 /// They are there.
 #[inline(never)]
-unsafe fn fold(angles: &Angles, reals: *const Complex32, folded: *mut Complex32, many: usize) {
+unsafe fn fold_fours(
+    angles: &Angles,
+    reals: *const Complex32,
+    folded: *mut Complex32,
+    many: usize,
+) {
     let half = many / 2;
     // SAFETY: it reads all of `reals`, writes all of `folded`, and takes as many angles as half of that, two at a time.
     unsafe {
@@ -363,12 +368,12 @@ unsafe fn fold(angles: &Angles, reals: *const Complex32, folded: *mut Complex32,
     }
 }
 
-/// [`Kernels::add_power`] of so many, a multiple of 8 and not 0.
+/// [`add_power`] of so many, a multiple of 8 and not 0.
 ///
 /// # Safety
 /// They are there.
 #[inline(never)]
-unsafe fn add_power(bins: *const Complex32, sums: *mut f32, many: usize) {
+unsafe fn add_power_eights(bins: *const Complex32, sums: *mut f32, many: usize) {
     // SAFETY: it reads and writes as many.
     unsafe {
         asm!(
@@ -405,76 +410,62 @@ unsafe fn add_power(bins: *const Complex32, sums: *mut f32, many: usize) {
     }
 }
 
-/// Cortex-M4F.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Chip;
+/// Those for a Cortex-M4F.
+pub(crate) const KERNELS: Kernels = Kernels {
+    clip,
+    band_energy,
+    fold_frame,
+    fold,
+    transform: transform_kernel::transform,
+    transform_reals: transform_kernel::transform_reals,
+    add_power,
+};
 
-impl Kernels for Chip {
-    fn clip(samples: &[i16], clipped: &mut [i16]) {
-        let many = samples.len().min(clipped.len()) & !3;
-        if many > 0 {
-            // SAFETY: there are so many of both.
-            unsafe { clip(samples.as_ptr(), clipped.as_mut_ptr(), many) };
+fn clip(samples: &[i16], clipped: &mut [i16]) {
+    let many = samples.len().min(clipped.len()) & !3;
+    if many > 0 {
+        // SAFETY: there are so many of both.
+        unsafe { clip_fours(samples.as_ptr(), clipped.as_mut_ptr(), many) };
+    }
+    let rest = samples.get(many..).zip(clipped.get_mut(many..));
+    let (samples, clipped) = rest.unwrap_or_default();
+    (Kernels::PLAIN.clip)(samples, clipped);
+}
+
+fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
+    let mut words = MaybeUninit::<[[u32; 3]; WORDS]>::uninit();
+    let words: *mut [u32; 3] = words.as_mut_ptr().cast();
+    let (mut sum, mut rest) = (0, samples);
+    loop {
+        let twelves = rest.len().saturating_sub(TAPS - 1) / AT_ONCE;
+        let twelves = twelves.min(MOST);
+        if twelves == 0 {
+            return sum + (Kernels::PLAIN.band_energy)(taps, rest);
         }
-        let rest = samples.get(many..).zip(clipped.get_mut(many..));
-        let (samples, clipped) = rest.unwrap_or_default();
-        Plain::clip(samples, clipped);
-    }
-
-    fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
-        let mut words = MaybeUninit::<[[u32; 3]; WORDS]>::uninit();
-        let words: *mut [u32; 3] = words.as_mut_ptr().cast();
-        let (mut sum, mut rest) = (0, samples);
-        loop {
-            let twelves = rest.len().saturating_sub(TAPS - 1) / AT_ONCE;
-            let twelves = twelves.min(MOST);
-            if twelves == 0 {
-                return sum + Plain::band_energy(taps, rest);
-            }
-            // SAFETY: as `twelves` was computed, no sample is read that is not there, and the words have room for them; what of
-            // these was never written does not count.
-            unsafe {
-                tactus_halve(rest.as_ptr(), words, (TAPS - 1 + AT_ONCE * twelves) / 4);
-                sum += tactus_band_energy(&raw const HALF_FILTERS, words, twelves);
-            }
-            rest = rest.get(AT_ONCE * twelves..).unwrap_or_default();
+        // SAFETY: as `twelves` was computed, no sample is read that is not there, and the words have room for them; what of
+        // these was never written does not count.
+        unsafe {
+            tactus_halve(rest.as_ptr(), words, (TAPS - 1 + AT_ONCE * twelves) / 4);
+            sum += tactus_band_energy(&raw const HALF_FILTERS, words, twelves);
         }
+        rest = rest.get(AT_ONCE * twelves..).unwrap_or_default();
     }
+}
 
-    fn fold_frame<'r>(
-        angles: &Angles,
-        frame: &[i16; FRAME],
-        buffer: &'r mut MaybeUninit<Folded>,
-    ) -> &'r mut Folded {
-        fold_frame(angles, frame, buffer)
+fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
+    let many = reals.len();
+    if many != folded.len() || many % 4 != 0 || many == 0 || many > FRAME / 4 {
+        return (Kernels::PLAIN.fold)(angles, reals, folded);
     }
+    // SAFETY: there are so many.
+    unsafe { fold_fours(angles, reals.as_ptr(), folded.as_mut_ptr(), many) };
+}
 
-    fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
-        let many = reals.len();
-        if many != folded.len() || many % 4 != 0 || many == 0 || many > FRAME / 4 {
-            return Plain::fold(angles, reals, folded);
-        }
-        // SAFETY: there are so many.
-        unsafe { fold(angles, reals.as_ptr(), folded.as_mut_ptr(), many) };
+fn add_power(bins: &[Complex32], sums: &mut [f32]) {
+    let many = bins.len();
+    if many != sums.len() || many % 8 != 0 || many == 0 {
+        return (Kernels::PLAIN.add_power)(bins, sums);
     }
-
-    fn add_power(bins: &[Complex32], sums: &mut [f32]) {
-        let many = bins.len();
-        if many != sums.len() || many % 8 != 0 || many == 0 {
-            return Plain::add_power(bins, sums);
-        }
-        // SAFETY: there are so many.
-        unsafe { add_power(bins.as_ptr(), sums.as_mut_ptr(), many) };
-    }
-
-    fn transform(angles: &Angles, values: &mut [Complex32]) {
-        transform_kernel::transform(angles, values);
-    }
-
-    fn transform_reals<'r>(
-        angles: &Angles,
-        reals: &'r mut Reals,
-    ) -> &'r mut [Complex32; FRAME / 16] {
-        transform_kernel::transform_reals(angles, reals)
-    }
+    // SAFETY: there are so many.
+    unsafe { add_power_eights(bins.as_ptr(), sums.as_mut_ptr(), many) };
 }

@@ -3,16 +3,14 @@
 use core::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
 use cortex_m::peripheral::SCB;
-use embassy_time::Timer;
+use embassy_time::{Duration, Timer, block_for};
 use tactus_core::sensor::slot::{self, Unexpected};
 use tactus_core::sensor::{FingerCode, FingerName, FingerParts, find};
 use tactus_core::wire::Reset;
 
+use super::rescue;
 use super::slots::Bus;
-use super::{rescue, wait_cycles};
 
-/// Cycles of the core in a us.
-const CYCLES_US: u32 = 168;
 /// The slowest finger, a BioTac, answers so long after it has got its power, ms.
 const POWER_UP_MS: u64 = {
     let all: &[FingerName] = &FingerName::ALL;
@@ -97,10 +95,15 @@ fn look(bus: &mut Bus) -> Option<FingerName> {
         let answer = slot::perform(&[*transaction], |transaction, bytes| {
             bus.transact(port, transaction, bytes)
         });
-        wait_cycles((transaction.gap_us + wait_us) * CYCLES_US);
+        wait(transaction.gap_us + wait_us);
         // a bus that is off reads as a part that is not there
         answer.unwrap_or_default()
     })
+}
+
+/// Waits for so many whole us, and the part of one that has passed.
+fn wait(us: u32) {
+    block_for(Duration::from_micros((us + 1).into()));
 }
 
 /// Does the finger's start-up list, and waits for it: 25 ms of a `mems`.
@@ -116,8 +119,7 @@ pub(crate) fn start(bus: &mut Bus) -> Result<(), Unexpected> {
         });
         // a bus that is off reads as a part that is not there
         step.check(parts.ports, &answer.unwrap_or_default())?;
-        let waits_us = step.transaction.gap_us + step.wait_us;
-        wait_cycles(waits_us * CYCLES_US);
+        wait(step.transaction.gap_us + step.wait_us);
     }
     Ok(())
 }

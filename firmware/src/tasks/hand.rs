@@ -33,7 +33,7 @@ use crate::chip::flash::{self, MappedTable};
 use crate::chip::motion::MotionBus;
 use crate::chip::slots::{self, Word};
 use crate::chip::watchdog;
-use crate::chip::{Chip, finger};
+use crate::chip::{KERNELS, finger};
 
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
@@ -326,7 +326,7 @@ pub(crate) async fn hand(
     booted: (Reset, Option<Text>),
 ) {
     static PLAN: StaticCell<Plan> = StaticCell::new();
-    let plan: &'static Plan = PLAN.init_with(Plan::new);
+    let plan: &'static Plan = PLAN.init_with(|| Plan::with(KERNELS));
     let buzzer = SimplePwm::new(
         handle.tones,
         None,
@@ -346,7 +346,7 @@ pub(crate) async fn hand(
     let mut memory = Memory::new(store, MappedTable, table, flash::buffer());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
-    let mut handheld = Handheld::<Chip>::new(plan, textures);
+    let mut handheld = Handheld::new(plan, textures);
     if let Some(why) = memory.trouble() {
         handheld.memory_failed(jobs::words(why));
     }

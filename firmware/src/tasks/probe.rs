@@ -18,7 +18,7 @@ use super::outbox::{self, tell};
 use super::rig_handle::ServoHandle;
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
-use crate::chip::{Chip, finger};
+use crate::chip::{KERNELS, finger};
 
 /// The sensor's first words are there so long after it was found.
 const HEARD_MS: u64 = 50;
@@ -88,7 +88,7 @@ async fn work<const HAS_STAGE: bool>(
         rig,
         memory: Memory::new(store, MappedTable, table, flash::buffer()),
         events: Told(Output::new(go.same, Level::Low, Speed::Low)),
-        plan: PLAN.init_with(Plan::new),
+        plan: PLAN.init_with(|| Plan::with(KERNELS)),
     };
     probe.memory.reload(&mut probe.events).await;
     // a lever that does not go up must not be asked again before somebody has looked at it
@@ -102,7 +102,7 @@ async fn work<const HAS_STAGE: bool>(
         let request = JOBS.receive().await;
         drive::progress();
         BUSY.store(true, Relaxed);
-        probe.serve::<Chip>(&request).await;
+        probe.serve(&request).await;
     }
 }
 

@@ -15,23 +15,23 @@ use tactus_world::world::{NotLifted, Setup};
 
 use crate::board::{Display, Emulator, Error, Options, Output};
 
-/// By now the firmware hears its host.
+/// Time by which the firmware hears its host, ms.
 const BOOTED_MS: u64 = 500;
-/// How often the person looks, ns.
+/// Interval between the person's looks, ns.
 const LOOK_NS: u64 = 20_000_000;
-/// What the display says when it waits for a touch.
+/// Text of the display when it waits for a touch.
 const PRESS: &str = "and hold";
-/// What the display says when it wants a slide, and when it wants none any more.
+/// Text of the display when it wants a slide, and when it wants none any more.
 const SLIDE: &str = "5 cm in 2 s";
 const OVER: [&str; 2] = ["next", "yes"];
-/// What a verdict says that is open: further slides may tell more.
+/// Text of a verdict that is open: further slides may decide.
 const OPEN: &str = "Slide on to be sure";
 
-/// Why a scenario did not come out as it says.
+/// Reasons why a scenario failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlayError {
-    /// A texture that is none.
+    /// An unknown texture.
     #[error(transparent)]
     Texture(#[from] InvalidScenario),
     /// The emulator.
@@ -40,21 +40,21 @@ pub enum PlayError {
     /// A sample cannot be changed.
     #[error(transparent)]
     NotLifted(#[from] NotLifted),
-    /// A step did not come out.
+    /// A step failed.
     #[error("step {number}, at {at_s:.2} s: {unmet}. The display:\n{display}")]
     Step {
         /// Which, from 1.
         number: usize,
-        /// When, s of virtual time.
+        /// Its time, s of virtual time.
         at_s: f64,
-        /// What was wrong.
+        /// The unmet expectation.
         unmet: Unmet,
-        /// What was seen.
+        /// The text on the display.
         display: String,
     },
 }
 
-/// What did not come out.
+/// The expectations that were not met.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unmet {
@@ -63,7 +63,7 @@ pub enum Unmet {
     NotSeen {
         /// Its parts.
         text: Vec<String>,
-        /// How long it was looked for.
+        /// Time for which it was looked for, s.
         within_s: f64,
     },
     /// A text that it should not show.
@@ -83,7 +83,7 @@ pub enum Unmet {
     NotEnough(u32),
 }
 
-/// What the person has seen of an exploration.
+/// The person's view of an exploration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Seen {
     /// The display is on.
@@ -114,11 +114,12 @@ impl Seen {
 pub struct PlayedBoard {
     /// As it is in the end.
     pub board: Emulator,
-    /// What the person saw, and when it was there first, ns.
+    /// The views of the person, and the time when each began, ns.
     pub seen: Vec<(u64, Seen)>,
 }
 
-/// Plays a scenario with a finger on a board with its ELF, which may hold a store from before. Gives the board as it is in the end.
+/// Plays a scenario with a finger on a board with its ELF, which may hold a store from before. Gives the board as it is
+/// in the end.
 pub fn play(
     scenario: &Scenario,
     finger: FingerName,
@@ -128,7 +129,7 @@ pub fn play(
     play_to(scenario, finger, elf, store, &[]).map(|played| played.board)
 }
 
-/// The same, and when it is switched on its host sends these bytes. From then on it tells what it does:
+/// The same, and its host sends these bytes when it is switched on. From then on it reports its events:
 /// [`Emulator::received`].
 pub fn play_to(
     scenario: &Scenario,
@@ -172,14 +173,14 @@ struct Played<'s> {
     elf: &'s Path,
     host: &'s [u8],
     texture: u8,
-    /// How often the board was switched on: every time is another trial.
+    /// Number of times that the board was switched on: every time is another trial.
     starts: u64,
     board: Option<Emulator>,
-    /// What was seen of an exploration, and when.
+    /// The views of an exploration, and their times.
     looks: Vec<(u64, Seen)>,
 }
 
-/// What a step comes to: what was wrong.
+/// The result of a step: the unmet expectation.
 type Done = Result<Result<(), Unmet>, PlayError>;
 
 impl Played<'_> {
@@ -221,7 +222,7 @@ impl Played<'_> {
         }
     }
 
-    /// Looks until it is so.
+    /// Looks until the condition holds.
     fn until(&mut self, within_s: f64, seen: impl Fn(&Display) -> bool) -> Result<bool, Error> {
         let Self { board, looks, .. } = self;
         let board = board.as_mut().expect("it was switched on");

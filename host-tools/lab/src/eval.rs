@@ -3,7 +3,6 @@
 pub mod alike;
 mod calibrate;
 pub mod courses;
-pub mod early;
 pub mod evaluate;
 pub mod evaluation;
 pub mod experiment;

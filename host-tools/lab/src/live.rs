@@ -1,18 +1,18 @@
 //! A simulated probe that somebody watches: it goes on step by step, and says at each what a display shows.
 //!
-//! The probe is the core's own, as on the chip: [`Session`] has it asked, lets time pass for it, and collects what it
-//! says. Besides, the same core is asked what the probe does not say: what is probable while a slide goes on, and where
-//! a slide lies among the textures. Requests and replies are JSON, so that a page needs one function.
+//! The probe is the core's own, as on the chip: [`Session`] has it asked, lets time pass for it, and collects what it says. Besides,
+//! the same core is asked what the probe does not say: what is probable while a slide goes on, and where a slide lies among the
+//! textures. Requests and replies are JSON, so that a page needs one function.
 
-mod hearing;
 mod message;
+mod monitor;
 mod scene;
 mod session;
 mod slides;
 mod standing;
 
-pub use hearing::{Hearing, Received, spectra};
 pub use message::{Expected, Frame, Happening, KnownTable, Measured, Reply, Request, Settings};
+pub use monitor::{ProbeMonitor, Received, spectra};
 pub use session::{Session, sentence};
 pub use slides::{TRIALS, Trials, WORLD, WorldError, bring_world, world_table};
 pub use standing::Standing;

@@ -3,9 +3,7 @@
 
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Explorer, ExplorerError, NEGLIGIBLE};
-use tactus_core::features::{
-    Block, FEATURE_STEPS, Measurement, Observation, PropertySet, Slide, SlideError,
-};
+use tactus_core::features::{Block, FEATURE_STEPS, Measurement, PropertySet, Slide, SlideError};
 use tactus_core::probe::explore::Random;
 use tactus_core::sensor::pressure::samples_in;
 use tactus_core::table::{Action, Contents, MAX_TEXTURES, Table};
@@ -131,8 +129,6 @@ pub struct Follower<'t> {
     /// P_DC of the slide so far, and which samples are at constant speed.
     pdc: Vec<i16>,
     steady: Option<(u32, u32)>,
-    /// How fast the slide was, where the probe says so.
-    pace: Option<i16>,
     /// The slide as it was at each length of the table that it has reached.
     looks: Vec<Result<Measurement, SlideError>>,
     /// The length at which it ended, from 1, where that was before its end.
@@ -166,7 +162,6 @@ impl<'t> Follower<'t> {
             samples: None,
             pdc: Vec::new(),
             steady: None,
-            pace: None,
             looks: Vec::new(),
             early: None,
             chosen: None,
@@ -192,7 +187,6 @@ impl<'t> Follower<'t> {
                 expected,
             } => {
                 self.samples = Some(Slide::new(self.plan, *movement));
-                self.pace = None;
                 self.looks.clear();
                 self.early = None;
                 self.chosen(*slide, *action, expected)
@@ -200,10 +194,6 @@ impl<'t> Follower<'t> {
             Event::Block(block) => self.block(block),
             Event::Pdc(counts) => {
                 self.pdc.extend_from_slice(counts);
-                Ok(())
-            }
-            Event::Pace(pace) => {
-                self.pace = Some(*pace);
                 Ok(())
             }
             Event::Early(ms) => {
@@ -338,10 +328,7 @@ impl<'t> Follower<'t> {
         self.in_order(slide)?;
         let compared = self.compare(slide, observed);
         // with what the probe reported, so that a difference of the slide is not counted again
-        let observation = Observation {
-            pace: self.pace.take(),
-            ..observed.observation()
-        };
+        let observation = observed.observation();
         let taken = match self.early.take() {
             Some(n) => self.explorer.observe_early(action, n, &observation),
             None => self.explorer.observe(action, &observation).map(|()| true),

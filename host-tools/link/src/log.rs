@@ -1,15 +1,12 @@
 //! Logs of sessions, which `tactus device --log` writes: a line of JSON for every command and every report.
 //!
-//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":7,"port":"/dev/ttyACM0"}}`. Each other
-//! one is
-//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log
-//! itself: the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and
-//! answered.
+//! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":1,"port":"/dev/ttyACM0"}}`. Each other is
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
+//! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, BufWriter, Read, Write};
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -29,7 +26,6 @@ pub enum Line<'a> {
         port: Cow<'a, str>,
     },
     /// What the probe was asked for.
-    #[serde(alias = "ask")]
     Command(Box<Cow<'a, Command>>),
     /// What it said.
     Report(Box<Cow<'a, Report>>),
@@ -54,9 +50,6 @@ impl<'a> Line<'a> {
         out.write_all(b"\n")
     }
 }
-
-/// Versions of the messages whose logs are read: since the first of them only reasons have become more than sentences.
-const LOGGED: RangeInclusive<u8> = 3..=PROTOCOL;
 
 /// Writes the log. A failure is kept until the caller asks for it.
 #[derive(Debug)]
@@ -126,10 +119,8 @@ pub enum LogError {
     },
     /// Messages of another version.
     #[error(
-        "written with version {0} of the messages, this program reads {oldest} to {PROTOCOL}: replay it with the \
-             tactus \
-         that wrote it",
-        oldest = LOGGED.start()
+        "written with version {0} of the messages, this program reads version {PROTOCOL}: replay it with the tactus \
+         that wrote it"
     )]
     Protocol(u8),
     /// The file cannot be read.
@@ -153,7 +144,7 @@ pub fn read(log: impl Read, mut each: impl FnMut(Line<'static>)) -> Result<(), L
         }
         let read = serde_json::from_slice(&line);
         match read.map_err(|why| LogError::Line { line: number, why })? {
-            Line::Session { protocol, .. } if !LOGGED.contains(&protocol) => {
+            Line::Session { protocol, .. } if protocol != PROTOCOL => {
                 return Err(LogError::Protocol(protocol));
             }
             line => each(line),

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tactus_core::explorer::{self, Config};
 use tactus_lab::data::properties::PropertyTable;
-use tactus_lab::eval::evaluation::{Asked, evaluation};
+use tactus_lab::eval::evaluation::{EvaluationRequest, evaluation};
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::learn::Expected;
 use tactus_lab::eval::{novelty, verify};
@@ -20,7 +20,7 @@ use crate::work::work;
 /// What is explored, and how.
 struct Asks {
     experiment: Experiment,
-    asked: Asked,
+    asked: EvaluationRequest,
 }
 
 /// Arguments that all of these take.
@@ -106,7 +106,7 @@ impl Asks {
         };
         Ok(Self {
             experiment: experiment.expecting(expected).with_features(features),
-            asked: Asked {
+            asked: EvaluationRequest {
                 method,
                 protocol,
                 runs,
@@ -194,7 +194,7 @@ fn leave_out<'py>(
             "--novelty needs {least} textures or more to leave out {left_out}: record more of them"
         )));
     }
-    let Asked { config, runs, .. } = asked;
+    let EvaluationRequest { config, runs, .. } = asked;
     let figures = work(py, |between| {
         novelty::leave_out(&experiment, config, left_out, runs, between)
     })?;
@@ -214,7 +214,7 @@ fn verifications<'py>(
             "--verify needs four textures or more: record more of them",
         ));
     }
-    let Asked { config, runs, .. } = asked;
+    let EvaluationRequest { config, runs, .. } = asked;
     let figures = work(py, |between| {
         verify::verify(&experiment, config, runs, between)
     })?;

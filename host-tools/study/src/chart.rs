@@ -1,4 +1,4 @@
-//! Charts as SVG: how they are drawn, whatever they show.
+//! Charts as SVG, for any contents.
 
 pub(crate) mod grid;
 mod labels;
@@ -12,7 +12,7 @@ pub(crate) use svg::{COLOURS, EM, GREY, WIDTH};
 pub use svg::{DrawError, Figure, escaped};
 use svg::{FONT, Failed, From, INK, Root, TEXT, Tip, caption, figure, write};
 
-/// What stands at a point.
+/// The mark at a point.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Mark {
     /// Nothing: only the line.
@@ -32,7 +32,7 @@ pub(crate) struct Series {
     pub(crate) name: String,
     pub(crate) colour: RGBColor,
     pub(crate) mark: Mark,
-    /// Whether a line joins them; dashed if they are only there for comparison.
+    /// The line that joins them, if any; dashed if they are only there for comparison.
     pub(crate) line: Option<Line>,
     /// Of the line, px.
     pub(crate) width: u32,
@@ -41,7 +41,7 @@ pub(crate) struct Series {
     pub(crate) bars: Vec<(f64, f64)>,
     /// Written beside each point where there is room; nothing where it is empty.
     pub(crate) labels: Vec<String>,
-    /// What each point says to those who point at it; nothing where it is empty.
+    /// Tooltip of each point; empty for none.
     pub(crate) says: Vec<String>,
 }
 
@@ -98,21 +98,21 @@ impl Series {
 /// A chart.
 pub(crate) struct Chart<'a> {
     pub(crate) title: String,
-    /// Whether the title is written above it, too.
+    /// True if the title is written above it, too.
     pub(crate) titled: bool,
-    /// What it shows, for those who cannot see it; empty where the title says it.
+    /// Its description, for those who cannot see it; empty if the title says it.
     pub(crate) about: String,
-    /// What an axis shows, with its unit.
+    /// Quantity of an axis, with its unit.
     pub(crate) x: &'a str,
     pub(crate) y: &'a str,
     pub(crate) x_range: (f64, f64),
     pub(crate) y_range: (f64, f64),
-    /// Number of marks on the x axis, and what stands there.
+    /// Number of marks on the x axis, and their labels.
     pub(crate) x_marks: usize,
     pub(crate) x_text: &'a dyn Fn(f64) -> String,
     /// Number of marks on the y axis.
     pub(crate) y_marks: usize,
-    /// A part of the x axis that is shaded, and why.
+    /// A part of the x axis that is shaded, and the reason.
     pub(crate) span: Option<((f64, f64), &'a str)>,
     /// Names at the ends of the lines rather than in a legend.
     pub(crate) named_at_end: bool,
@@ -128,7 +128,7 @@ pub(crate) const PANEL: (u32, u32) = (WIDTH, 350);
 /// Height of a line of words, px.
 const LINE: i32 = TEXT as i32 + 2;
 
-/// Range that holds all values, with a little room.
+/// Range that holds all values, with a little margin.
 pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .filter(|v| v.is_finite())
@@ -146,35 +146,6 @@ pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
 fn plain(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
     format!("{}", rounded + 0.0)
-}
-
-/// Draws curves over the same x as SVG, each with its name.
-///
-/// # Errors
-/// See [`DrawError`].
-pub fn curves(
-    title: &str,
-    x: &str,
-    y: &str,
-    curves: &[(&str, Vec<(f64, f64)>)],
-) -> Result<String, DrawError> {
-    let series = curves.iter().enumerate();
-    let series = series.map(|(n, (name, points))| {
-        Series::curve(
-            n % MARKS.len(),
-            MARKS[n % MARKS.len()],
-            *name,
-            points.clone(),
-        )
-    });
-    let x_range = buffer(
-        curves
-            .iter()
-            .flat_map(|(_, points)| points)
-            .map(|(x, _)| *x),
-    );
-    let chart = Chart::new(title, x, y, x_range, series.collect());
-    Ok(chart.figure("")?.svg)
 }
 
 impl<'a> Chart<'a> {
@@ -223,7 +194,7 @@ impl<'a> Chart<'a> {
         })
     }
 
-    /// Draws it, and says where in the drawing the area between the axes is, and what its points say.
+    /// Draws it; returns the area between the axes, and the tooltips of its points.
     fn draw(&self, root: &Root<'_>) -> Result<(Area, Vec<Tip>), Failed> {
         let (full, tall) = (self.size.0 as i32, self.size.1 as i32);
         let mut top = match self.titled {
@@ -317,7 +288,7 @@ impl<'a> Chart<'a> {
             if let (true, false, Some(&(x, mut y))) =
                 (self.named_at_end, series.name.is_empty(), at.last())
             {
-                // names do not cover each other, nor what is written below the axis
+                // names cover neither each other nor the words below the axis
                 let away = if y > (top + bottom) / 2 { -1 } else { 1 };
                 while ends.iter().any(|other| (other - y).abs() < LINE - 3) {
                     y += away;
@@ -341,7 +312,7 @@ impl<'a> Chart<'a> {
         Ok(([left, top, right, bottom], tips))
     }
 
-    /// Writes the legend below the title, in as many lines as it takes; gives the px down to its end.
+    /// Writes the legend below the title, in as many lines as it takes; returns the px down to its end.
     fn legend(&self, root: &Root<'_>, top: i32) -> Result<i32, Failed> {
         const SIGN: i32 = 30;
         let (mut x, mut y) = (10, top + 8);
@@ -394,7 +365,7 @@ impl<'a> Chart<'a> {
     }
 }
 
-/// Colour of a part of an axis, and how much of it.
+/// Colour of a part of an axis, and its opacity.
 const SPAN: RGBColor = COLOURS[4];
 const SPAN_SHADE: f64 = 0.25;
 

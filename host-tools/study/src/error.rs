@@ -1,4 +1,4 @@
-//! Why a study comes to nothing.
+//! Reasons why a study fails.
 
 use tactus_lab::eval::evaluate::EvaluateError;
 use tactus_lab::eval::experiment::ExperimentError;
@@ -6,15 +6,15 @@ use tactus_lab::eval::learn::TableError;
 use tactus_lab::sim::collection::TrialError;
 use tactus_lab::sim::rig::SimError;
 
-/// Why a study comes to nothing.
+/// Reasons why a study fails.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A stage of the study came to nothing.
+    /// A stage of the study failed.
     #[error("{stage}")]
     Stage {
         /// Its name.
         stage: &'static str,
-        /// Why.
+        /// The reason.
         source: Box<StudyError>,
     },
     /// The rig of a world fails before the first texture.
@@ -24,10 +24,10 @@ pub enum StudyError {
     Calibration {
         /// The world's seed.
         world: u64,
-        /// How.
+        /// The rig's error.
         source: SimError,
     },
-    /// A trial gave nothing.
+    /// A trial failed.
     #[error(transparent)]
     Trial(#[from] TrialError),
     /// The table cannot be learned.
@@ -42,7 +42,7 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// The same, and in which stage of the study.
+    /// The same, with the stage of the study.
     #[must_use]
     pub fn in_stage(self, stage: &'static str) -> Self {
         Self::Stage {

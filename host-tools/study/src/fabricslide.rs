@@ -1,35 +1,36 @@
-//! Folders like `data/fabricslide`: fabrics that a finger of 16 capacitive taxels was slid over with many movements. It is
-//! what shows that choosing the movement pays; the BioTac recordings have one movement only.
+//! Folders like `data/fabricslide`: fabrics that a finger of 16 capacitive taxels was slid over with many movements.
+//! They show that choosing the movement pays; the BioTac recordings have one movement only.
 //!
 //! # Which slides
 //!
-//! A recording is one pass of the finger. Its first 6 % are dropped, where the finger gets up to speed, and the rest is cut
-//! into two halves: two slides. The [`FabricSlide::repetition`] that one learns from is the manifest's `rep`, and the other
-//! one is what is tested on.
+//! A recording is one pass of the finger. Its first 6 % are dropped, where the finger gets up to speed, and the rest is
+//! cut into two halves: two slides. The [`FabricSlide::repetition`] that a table is learned from is the manifest's
+//! `rep`, and the other one is for testing.
 //!
-//! All fabrics must have the same movements, so only this is taken:
-//! - the direction in which the fabrics share most movements, and any other in which they share all that is taken of it;
+//! All fabrics must have the same movements, so only these are taken:
+//! - the direction in which the fabrics share most movements, and any other in which they share all of them;
 //! - movements of which every fabric has both repetitions in these directions;
-//! - of these a whole grid of set-points and speeds: as long as one is incomplete, the set-point or speed that lacks the
-//!   largest share of its movements goes.
+//! - of these a whole grid of set-points and speeds: as long as one is incomplete, the set-point or speed that lacks
+//!   the largest share of its movements goes.
 //!
-//! In `data/fabricslide` two denims were slid over in direction -1 only, and one fabric was not pressed with 180 at 150 mm/s.
-//! What remains is the protocol's 15 movements, 120, 150 and 180 at 10, 20, 50, 100 and 120 mm/s, each with two slides per
-//! repetition. One learns from repetition 0: the manifest holds out "repetition 2", which is its `rep` 1.
+//! In `data/fabricslide` two denims were slid over in direction -1 only, and one fabric was not pressed with 180 at
+//! 150 mm/s. The protocol's 15 movements remain, 120, 150 and 180 at 10, 20, 50, 100 and 120 mm/s, each with two slides
+//! per repetition. Tables are learned from repetition 0: the manifest holds out "repetition 2", which is its `rep` 1.
 //!
-//! Of the readings that were tried this one comes nearest to the protocol's figures, by an independent program (numpy, 8000
-//! runs): 58 % right by the paper's way (the protocol says 56), 96 by Student-t (96), 100 in 2.8 slides by three properties
-//! fused (99.9 in 2.7), 100 by eight bands fused (100). With the repetitions exchanged it is 78, 97, 100 in 1.9, and 100. The
-//! paper's figure is brittle, for its standard deviations come of two slides: a Hann window that is symmetric instead of
-//! periodic makes it 50, so it does not tell readings apart. The facts do not define the spatial decorrelation; of two
-//! definitions the one taken fits, while 1 less the share of the common mode makes three properties fused 92.
+//! Of the definitions that were tried this one comes nearest to the protocol's figures, by an independent program
+//! (numpy, 8000 runs): 58 % right by the paper's way (protocol: 56), 96 by Student-t (96), 100 in 2.8 slides by three
+//! properties fused (99.9 in 2.7), 100 by eight bands fused (100). With the repetitions exchanged it is 78, 97, 100 in
+//! 1.9, and 100. The paper's figure is brittle, for its standard deviations come from two slides: a Hann window that is
+//! symmetric instead of periodic makes it 50, so it does not decide between definitions. The facts do not define the
+//! spatial decorrelation; of two definitions the one taken fits, while 1 less the share of the common mode makes three
+//! properties fused 92.
 //!
 //! # What is measured
 //!
 //! See [`FabricSlide`]. Spectra are those of frames of 256 samples, 128 apart, with a periodic Hann window. A slide at
-//! 50 mm/s or faster is shorter than that (83 samples at 120 mm/s); it makes one frame that is filled up with zeros behind
-//! it. The sum of the squares of the window is that of all 256 samples also then. That scales the powers of such slides, the
-//! same for all fabrics, for a movement decides on the length.
+//! 50 mm/s or faster is shorter than that (83 samples at 120 mm/s); it makes one frame that is filled up with zeros
+//! behind it. The sum of the squares of the window is that of all 256 samples also then. That scales the powers of such
+//! slides, the same for all fabrics, for a movement decides on the length.
 mod error;
 mod features;
 mod manifest;
@@ -60,11 +61,11 @@ pub struct FabricSet {
     pub fabrics: Vec<String>,
     /// The movements all fabrics share, by set-point and then by speed.
     ///
-    /// The set-point stands in place of the contact force in mN. It is the mean taxel reading that the robot controlled to;
-    /// what it was in newtons was not published.
+    /// The set-point stands in place of the contact force in mN. It is the mean taxel reading that the robot controlled
+    /// to; its value in newtons was not published.
     pub movements: Vec<Movement>,
-    /// Fabric by fabric, movement by movement, repetition 0 before 1, in the order of time within a recording. Every fabric
-    /// has the same number of slides of every movement and repetition.
+    /// Fabric by fabric, movement by movement, repetition 0 before 1, in the order of time within a recording. Every
+    /// fabric has the same number of slides of every movement and repetition.
     pub slides: Vec<FabricSlide>,
 }
 
@@ -77,14 +78,15 @@ pub struct FabricSlide {
     pub movement: usize,
     /// 0 or 1.
     pub repetition: u8,
-    /// ln(P + 0.1) of eight bands, see [`BAND_EDGES`]: P is |X|^2 over the sum of the squares of the window, averaged over the
-    /// bins of the band, the 16 taxels, each without its linear trend, and the frames.
+    /// ln(P + 0.1) of eight bands, see [`BAND_EDGES`]: P is |X|^2 over the sum of the squares of the window, averaged
+    /// over the bins of the band, the 16 taxels, each without its linear trend, and the frames.
     pub ln_bands: [f32; 8],
-    /// What Bayesian exploration has here for traction, roughness and fineness, all natural logarithms: power in counts^2
-    /// (the variance of a taxel about its linear trend, averaged over taxels), centroid of the spectrum in bins (the constant
-    /// left out), and spatial decorrelation (1 less the mean correlation of two taxels).
+    /// Properties for Bayesian exploration in place of traction, roughness and fineness, all natural logarithms: power
+    /// in counts^2 (the variance of a taxel about its linear trend, averaged over taxels), centroid of the spectrum in
+    /// bins (the constant left out), and spatial decorrelation (1 less the mean correlation of two taxels).
     ///
-    /// The mean is over all pairs, so that the order of the taxels does not matter: it is not the same in all recordings.
+    /// The mean is over all pairs, so that the order of the taxels does not matter: it is not the same in all
+    /// recordings.
     pub properties: [f32; 3],
 }
 
@@ -121,8 +123,8 @@ impl FabricSet {
     /// Reads and measures all fabrics of a folder.
     ///
     /// # Errors
-    /// If the folder, its manifest or a file of samples cannot be read, makes no sense or was changed, or if the fabrics have
-    /// no movement in common.
+    /// If the folder, its manifest or a file of samples cannot be read, makes no sense or was changed, or if the
+    /// fabrics have no movement in common.
     pub fn open(folder: &Path) -> Result<Self, FabricError> {
         if !folder.is_dir() {
             return Err(FabricError::NoFolder(folder.to_owned()));

@@ -1,5 +1,5 @@
-//! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual explorations,
-//! each slide drawn from the validation trials.
+//! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual
+//! explorations, each slide drawn from the validation trials.
 
 use serde::{Deserialize, Serialize};
 use tactus_core::explorer::{Config, Explorer};
@@ -17,7 +17,7 @@ use tactus_lab::sim::collection::{Collection, texture_name};
 
 /// The ways of exploring that are compared, the paper's three and the project's own.
 pub const METHODS: [Method; 4] = [Method::Cycle, Method::Random, Method::Paper, Method::Fused];
-/// What a way of exploring is called, in short.
+/// The short name of a way of exploring.
 pub fn short_name(method: Method) -> &'static str {
     match method {
         Method::Cycle => "cycling",
@@ -32,7 +32,7 @@ pub const MAX_SLIDES: u8 = 10;
 /// Most movements for a pair. The paper gives no limit; no pair comes near this one.
 const MAX_PAIR_SLIDES: u8 = 254;
 
-/// How a way of exploring did: a column of Table 5.
+/// Results of a way of exploring: a column of Table 5.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Column {
     /// Right answers, %.
@@ -129,13 +129,13 @@ pub struct PairRow {
     pub textures: [Named; 2],
     /// Right answers, %.
     pub correct: f64,
-    /// Explorations that came to 99.9 %, in %.
+    /// Explorations that reached 99.9 %, in %.
     pub converged: f64,
     /// Median number of movements.
     pub median: f64,
     /// Mean number of movements.
     pub mean: f64,
-    /// What the paper has: right answers of people and of its machine, %.
+    /// The paper's shares of right answers of people and of its machine, %.
     pub paper: [f64; 2],
 }
 
@@ -184,18 +184,17 @@ pub struct Identification {
     pub simulations: u64,
     /// The textures, in the order of Table 5.
     pub textures: Vec<Named>,
-    /// What cycling went through: the best movement of each property.
+    /// The cycle of cycling: the best movement of each property.
     pub cycled: Vec<(usize, Property)>,
     /// The ways of exploring, as [`METHODS`].
     pub columns: Vec<Column>,
-    /// What users would have been told, by each way of exploring.
+    /// Verdicts, by each way of exploring.
     pub told: Vec<ToldColumn>,
     /// Explorations by Bayesian exploration, as in fig. 10.
     pub evolutions: Vec<Evolution>,
 }
 
-/// What users would have been told: `tactus identify` knows that the texture may be none of its own, and no slide counts
-/// twice.
+/// Shares of the verdicts: `tactus identify` allows for an unknown texture, and no slide counts twice.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ToldColumn {
     /// Shares of the explorations.
@@ -227,15 +226,15 @@ impl ToldColumn {
 /// One exploration, step by step.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Evolution {
-    /// What it is an example of.
+    /// The kind that it is an example of.
     pub example: String,
-    /// Which of the simulations it is.
+    /// Number of the simulation.
     pub simulation: u64,
     /// The unknown texture.
     pub unknown: Named,
     /// The answer.
     pub identified: Named,
-    /// Whether it came to 99 %.
+    /// True if it reached 99 %.
     pub sure: bool,
     /// Movement (from 0) and property of each step.
     pub steps: Vec<(u8, Property)>,
@@ -243,7 +242,7 @@ pub struct Evolution {
     pub probabilities: Vec<(Named, Vec<f32>)>,
 }
 
-/// A texture less probable than this at all times is not shown.
+/// Textures that are always less probable than this are not shown.
 const LIKELY: f32 = 0.1;
 
 impl Identification {
@@ -319,7 +318,7 @@ fn examples(outcomes: &[Outcome]) -> Vec<(&'static str, u64)> {
     kinds.into_iter().filter_map(first).collect()
 }
 
-/// Plays a simulation again, and keeps what was thought at each step.
+/// Plays a simulation again, and keeps the posterior at each step.
 fn evolution(
     experiment: &Experiment,
     explorer: &mut Explorer<'_, MAX_TEXTURES>,
@@ -357,7 +356,7 @@ fn evolution(
     }
 }
 
-/// What came out in one of several worlds.
+/// The results in one of several worlds.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct WorldRow {
     /// The world.

@@ -1,5 +1,5 @@
-//! The paper's whole study on the simulated rig: the pilot that finds the movements, the training, the eight pairs, and the
-//! identification among all 117 textures, beside the published numbers.
+//! The paper's whole study on the simulated rig: the pilot that finds the movements, the training, the eight pairs, and
+//! the identification among all 117 textures, beside the published numbers.
 
 pub mod chart;
 mod error;

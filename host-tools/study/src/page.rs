@@ -1,4 +1,5 @@
-//! Pages for a browser: HTML that needs no other file and no script, and is well-formed XML, so that a small parser can check it.
+//! Pages for a browser: HTML that needs no other file and no script, and is well-formed XML, so that a small parser can
+//! check it.
 
 use minijinja::Environment;
 use minijinja::syntax::SyntaxConfig;

@@ -1,4 +1,4 @@
-//! The pictures that commands draw with `--plot`: what each shows, and how it is counted.
+//! The pictures that commands draw with `--plot`: their contents, and their counting.
 
 pub mod control;
 pub mod evaluation;

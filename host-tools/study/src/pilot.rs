@@ -1,4 +1,4 @@
-//! The pilot study: which of 36 movements tells ten textures best apart by which property (figs. 5, 6, 7).
+//! The pilot study: the best of 36 movements for separating ten textures by each property (figs. 5, 6, 7).
 
 use serde::{Deserialize, Serialize};
 use tactus_core::explorer::{Config, Explorer, Method};
@@ -15,7 +15,7 @@ use tactus_lab::sim::collection::texture_name;
 /// Number of the pilot's session: see [`Session::number`].
 const SESSION: u64 = 3;
 
-/// What the pilot study found.
+/// The results of the pilot study.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Pilot {
     /// The textures.
@@ -37,14 +37,14 @@ pub struct PilotMovement {
     pub speed_mm_s: f32,
     /// Sliding power with a coefficient of friction of 1, mW (eq. 22).
     pub power_mw: f32,
-    /// Whether it is avoided for its wear.
+    /// True if it is avoided for its wear.
     pub high_wear: bool,
-    /// How much of the ridges 100 slides took, mean over the textures, %.
+    /// Wear of the ridges by 100 slides, mean over the textures, %.
     pub wear: f64,
-    /// Uncertainty that one slide leaves among the textures, by property (eq. 11); 1, which is all, for a movement that was
-    /// not reached on every texture.
+    /// Uncertainty that one slide leaves among the textures, by property (eq. 11); 1, which is all, for a movement that
+    /// was not reached on every texture.
     pub uncertainty: [f32; 3],
-    /// Where the rig could not make it.
+    /// Textures on which the rig could not make it.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub not_reached: Vec<Missed>,
 }
@@ -56,7 +56,7 @@ pub struct Missed {
     pub texture: u8,
     /// Number of the trial that failed, from 1.
     pub trial: u32,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
@@ -69,7 +69,7 @@ pub struct MostUseful {
     pub movement: usize,
     /// The same for the one that the paper found.
     pub paper: usize,
-    /// What is left by the best of all, those that wear the skin among them.
+    /// The best movement of all, including those that wear the skin.
     pub with_wear: usize,
 }
 
@@ -95,7 +95,7 @@ impl Pilot {
         Self::of(&movements, &trials)
     }
 
-    /// What the trials say.
+    /// The results of these trials.
     ///
     /// # Errors
     /// See [`StudyError`].

@@ -1,4 +1,4 @@
-//! What Fishel & Loeb published (Front. Neurorobot. 6:4, 2012): every number that the study puts beside its own.
+//! Published numbers of Fishel & Loeb (Front. Neurorobot. 6:4, 2012), for comparison with the study's own.
 
 use tactus_core::features::{Movement, Property};
 
@@ -14,7 +14,7 @@ pub const MOST_USEFUL: [(Movement, Property); 3] = [
 ];
 /// Trials of each movement in training and in validation.
 pub const TRIALS: u32 = 5;
-/// How often the skin was replaced during the training.
+/// Number of times that the skin was replaced during the training.
 pub const SKIN_CHANGES: u32 = 2;
 
 /// Correlations of Table 3 by movement: traction and roughness, traction and fineness, roughness and fineness.

@@ -1,7 +1,7 @@
-//! The report of a study: one HTML page that needs nothing else, every figure as .svg, every table as .csv, and study.json.
+//! The report of a study: one HTML page that needs nothing else, study.json with all numbers, and the learned tables.
 //!
-//! The words of the page are in its template, `report/page.html`. The files beside it make the tables and figures, and the
-//! numbers that stand between the words.
+//! The words of the page are in its template, `report/page.html`. The files beside it make the tables and figures, and
+//! the numbers that stand between the words.
 
 mod error;
 mod folder;
@@ -15,7 +15,7 @@ mod training;
 use serde_json::json;
 
 use super::results::Study;
-pub use crate::chart::{DrawError, curves};
+pub use crate::chart::DrawError;
 use crate::page::render;
 pub use error::ReportError;
 pub use folder::Folder;
@@ -29,18 +29,6 @@ pub fn write(study: &Study, folder: Folder) -> Result<(), ReportError> {
     folder.clear()?;
     let put = |name: &str, bytes: &[u8]| folder.put(name, bytes);
     let report = report(study)?;
-    let shown = report.tables.iter().map(|(id, table)| (*id, table));
-    let files = report.files.iter().map(|(id, table)| (id.as_str(), table));
-    for (id, table) in shown.chain(files) {
-        let csv = table.csv().map_err(|source| ReportError::Table {
-            table: id.to_owned(),
-            source,
-        })?;
-        put(&format!("tables/{id}.csv"), &csv)?;
-    }
-    for figure in report.figures.values().flatten() {
-        put(&format!("figures/{}.svg", figure.id), figure.svg.as_bytes())?;
-    }
     for table in study.training.iter().flat_map(|t| &t.tables) {
         put(&table.file, &table.data)?;
     }
@@ -62,7 +50,7 @@ pub fn json(study: &Study) -> Result<String, ReportError> {
     Ok(serde_json::to_string(study).map_err(ReportError::Json)? + "\n")
 }
 
-/// Tables, figures and numbers of all that was studied.
+/// Tables, figures and numbers of the whole study.
 fn report(study: &Study) -> Result<Report, DrawError> {
     let mut report = Report::default();
     let about = json!({

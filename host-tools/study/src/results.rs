@@ -1,4 +1,4 @@
-//! Everything that a study found, and the one knob that its worlds have.
+//! All results of a study, and the one parameter of its worlds.
 
 use serde::Serialize;
 
@@ -7,12 +7,12 @@ use super::pilot::Pilot;
 use super::signals::Signals;
 use super::training::Training;
 
-/// The variation of trials in the study's worlds: its one free knob. Set on worlds 1 to 10, by
-/// `tactus study identify --seeds 1-10 --variation X`, so that Bayesian exploration is right about as often as in the paper
-/// (95.4 %).
+/// The variation of trials in the study's worlds: its one free parameter. Set on worlds 1 to 10, by
+/// `tactus study identify --seeds 1-10 --variation X`, so that Bayesian exploration is right about as often as in the
+/// paper (95.4 %).
 pub const VARIATION: f64 = 1.2;
 
-/// Everything that a study found: study.json.
+/// All results of a study: study.json.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Study {
     /// Of this program.
@@ -21,7 +21,7 @@ pub struct Study {
     pub command: String,
     /// The world.
     pub seed: u64,
-    /// How much its trials differ.
+    /// Variation of its trials.
     pub variation: f64,
     /// Virtual explorations of each way of exploring; each pair has an eighth.
     pub simulations: u64,
@@ -37,7 +37,7 @@ pub struct Study {
     /// The identification among all textures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub identification: Option<Identification>,
-    /// What the sensor says.
+    /// The sensor's signals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub signals: Option<Signals>,
     /// The same in other worlds.

@@ -1,4 +1,4 @@
-//! What the sensor says while it is pressed (fig. 3) and while it slides (fig. 4).
+//! The sensor's signals while it is pressed (fig. 3) and while it slides (fig. 4).
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use tactus_world::slot::Reader;
 /// Numbers of the sessions: see [`super::slides::Session::number`].
 const PRESS: u64 = 5;
 const EXAMPLES: u64 = 6;
-/// What is pressed on: acrylic, hard and flat as a force plate is.
+/// Texture that is pressed on: acrylic, hard and flat as a force plate is.
 const PLATE: u8 = 41;
 /// Largest force of the line, N (paper, fig. 3).
 const LINEAR_N: f64 = 2.0;
@@ -72,7 +72,7 @@ pub struct Example {
     pub texture: Named,
     /// Force in N, speed in mm/s.
     pub movement: (f32, f32),
-    /// Begin of what is shown of P_AC, s from the slide's begin.
+    /// Begin of the shown part of P_AC, s from the slide's begin.
     pub from_s: f64,
     /// P_AC, Pa, 2200 a second.
     pub pac_pa: Vec<f64>,

@@ -1,7 +1,7 @@
 //! The slides of the study: textures one after the other under one finger, whose skin wears and is changed.
 //!
-//! Every slide is made by the whole simulated rig: the core's control presses and slides, the world answers in sensor words,
-//! and the core decodes them and computes the features, as the chip does.
+//! Every slide is made by the whole simulated rig: the core's control presses and slides, the world answers in sensor
+//! words, and the core decodes them and computes the features, as the chip does.
 
 use std::fmt;
 
@@ -23,20 +23,20 @@ use tactus_lab::sim::rig::{SimError, SimRig};
 use tactus_world::finger::wear_per_mm;
 use tactus_world::{Conditions, textures};
 
-/// Wear at which the ridges look worn: the skin is changed before the next texture (paper: at any visible sign). Chosen, so
-/// that the 1755 slides of the training take about the two changes that they took in the paper.
+/// Wear at which the ridges look worn: the skin is changed before the next texture (paper: at any visible sign).
+/// Chosen, so that the 1755 slides of the training take about the two changes that they took in the paper.
 pub const VISIBLE_WEAR: f64 = 0.05;
 
 /// Numbers of the sessions of a world: trials of different sessions differ.
 const TRAINING: u64 = 1;
 const VALIDATION: u64 = 2;
 
-/// One of the study's worlds: its textures, its finger, and the knob.
+/// One of the study's worlds: its textures, its finger, and the variation.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StudyWorld {
     /// The world's seed.
     pub seed: u64,
-    /// How much trials differ: [`Conditions::variation`].
+    /// Variation of the trials: [`Conditions::variation`].
     pub variation: f64,
 }
 
@@ -49,7 +49,7 @@ pub struct TextureTrials {
     pub slides: Vec<Vec<Observation>>,
     /// Wear of the skin before the first slide, and after the last of each movement.
     pub wear: Vec<f64>,
-    /// Whether the skin was changed before the first slide.
+    /// True if the skin was changed before the first slide.
     pub new_skin: bool,
     /// Movements that the rig could not make on this texture. Only those of the pilot, which keeps them in its own way.
     #[serde(skip)]
@@ -63,11 +63,11 @@ pub struct NotReached {
     pub movement: usize,
     /// Number of the trial, from 1; those before it were made.
     pub trial: u32,
-    /// Why not.
+    /// The reason.
     pub why: SimError,
 }
 
-/// What is slid over in one go: the same finger, movement by movement on each texture.
+/// One session of slides: the same finger, movement by movement on each texture.
 #[derive(Clone, Debug)]
 pub struct Session<'a> {
     /// Numbers of the textures, in the order of time.
@@ -78,10 +78,10 @@ pub struct Session<'a> {
     pub trials: u32,
     /// Tells sessions of one world apart: their trials differ.
     pub number: u64,
-    /// Whether the guard of the force watches. The paper's rig had none, and its pilot study needs forces up to 2 N, where
-    /// the shear on a sticky texture alone takes P_DC over the guard's limit.
+    /// True if the guard of the force is on. The paper's rig had none, and its pilot study needs forces up to 2 N,
+    /// where the shear on a sticky texture alone takes P_DC over the guard's limit.
     pub force_guard: bool,
-    /// Whether a movement that the rig cannot make is a result, [`TextureTrials::not_reached`], and no failure.
+    /// True if a movement that the rig cannot make is a result, [`TextureTrials::not_reached`], and no failure.
     pub may_miss: bool,
 }
 
@@ -110,7 +110,7 @@ impl StudyWorld {
         SimRig::under(setup, Conditions { variation, wear }, unguarded)
     }
 
-    /// What the rigs of this world have in common.
+    /// The calibration that the rigs of this world share.
     ///
     /// # Errors
     /// See [`StudyError`].
@@ -120,7 +120,7 @@ impl StudyWorld {
             .map_err(|source| StudyError::Calibration { world, source })
     }
 
-    /// Makes all slides of a session, textures side by side; `done` hears of each texture.
+    /// Makes all slides of a session, textures side by side; `done` is called after each texture.
     ///
     /// # Errors
     /// The first fault of a rig, or slide without properties.
@@ -227,8 +227,8 @@ impl StudyWorld {
 
     /// The skin before each texture: its wear, and whether it is new.
     ///
-    /// Wear only grows with sliding, so what the textures before take of it is known from their friction, and all can be
-    /// recorded side by side. A test holds it against the wear that comes.
+    /// Wear only grows with sliding, so the wear by earlier textures follows from their friction, and all can be
+    /// recorded side by side. A test compares it with the simulated wear.
     pub fn skins(self, session: &Session<'_>) -> Vec<(u8, f64, bool)> {
         let mut wear = 0.0;
         let next = session.textures.iter().map(|&number| {
@@ -249,12 +249,13 @@ impl StudyWorld {
     }
 }
 
-/// About how long the rig slides with a movement, mm: 3 s, or what the sample has room for.
+/// Approximate length of a slide with a movement, mm: 3 s, or the length that the sample leaves.
 fn slide_mm(movement: Movement) -> f64 {
     f64::from((3.0 * movement.speed_mm_s()).min(SlidePath::LONGEST_MM))
 }
 
-/// What a world's identification needs: the training of all textures, and the validation trials of those of Tables 4 and 5.
+/// The data for a world's identification: the training of all textures, and the validation trials of those of Tables
+/// 4 and 5.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Recorded {
     /// All 117.
@@ -267,7 +268,7 @@ impl StudyWorld {
     /// Textures of [`StudyWorld::train_and_validate`], for a progress bar.
     pub const RECORDED: u64 = 117 + IDENTIFIED.len() as u64;
 
-    /// Makes the slides of training and validation; `done` hears of each texture.
+    /// Makes the slides of training and validation; `done` is called after each texture.
     ///
     /// # Errors
     /// See [`StudyError`].
@@ -304,7 +305,7 @@ pub struct Named {
 
 impl<'de> Deserialize<'de> for Named {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        /// The number says it all.
+        /// A texture in the form that has its number only.
         #[derive(Deserialize)]
         struct Numbered {
             number: u8,

@@ -1,5 +1,5 @@
-//! Training: what 117 textures feel like, how their properties go together (Table 3), how they are confused (figs. 8, 9),
-//! and what a worn skin does to the data.
+//! Training: the properties of 117 textures, their correlations (Table 3), their confusion (figs. 8, 9), and the effect
+//! of a worn skin on the data.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -18,12 +18,12 @@ use tactus_lab::sim::collection::{Collection, texture_name};
 const WEAR: [f64; 5] = [0.0, VISIBLE_WEAR, 0.25, 0.5, 1.0];
 /// Trials of each texture and movement at each of them.
 const WEAR_TRIALS: u32 = 3;
-/// Number of their session: the touches are the same, whatever the wear.
+/// Number of their session: the touches are the same at any wear.
 const WEAR_SESSION: u64 = 4;
 /// Pairs that are listed as the most confused.
 const LISTED: usize = 12;
 
-/// What the training found.
+/// The results of the training.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Training {
     /// The movements: force in N, speed in mm/s.
@@ -38,7 +38,7 @@ pub struct Training {
     pub geometric_mean: Vec<Vec<f32>>,
     /// Geometric mean of the three of the most useful movements and their properties.
     pub geometric_mean_most_useful: Vec<Vec<f32>>,
-    /// By property: correlation over the textures of what two movements say of it, mean over the pairs of movements.
+    /// By property: correlation over the textures of its values at two movements, mean over the pairs of movements.
     pub between_movements: [f64; 3],
     /// Pairs of textures whose geometric mean of the nine is over one half, and the same of the three.
     pub pairs_confused: (usize, usize),
@@ -50,7 +50,7 @@ pub struct Training {
     pub tables: Vec<TableFile>,
 }
 
-/// A texture and what was learned of it.
+/// A texture and its learned Gaussians.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Trained {
     /// The texture.
@@ -62,7 +62,7 @@ pub struct Trained {
     pub properties: Vec<Vec<[f32; 3]>>,
     /// Wear of the skin before the first slide and after the last, % of the ridges.
     pub wear: (f64, f64),
-    /// Whether the skin was changed before the first slide.
+    /// True if the skin was changed before the first slide.
     pub new_skin: bool,
 }
 
@@ -86,7 +86,7 @@ pub struct Confusion {
     pub matrix: Vec<Vec<f32>>,
 }
 
-/// Two textures and how they are confused.
+/// Two textures and their confusion.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ConfusedPair {
     /// The textures.
@@ -97,20 +97,20 @@ pub struct ConfusedPair {
     pub most_useful: f32,
 }
 
-/// Wear of the skin during training, and what it does to the data.
+/// Wear of the skin during training, and its effect on the data.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Skin {
     /// The skin was changed before these textures.
     pub changed_before: Vec<Named>,
-    /// How often it was changed in the paper.
+    /// Number of changes in the paper.
     pub paper_changes: u32,
     /// Wear at which it is changed, % of the ridges.
     pub changed_at: f64,
-    /// What wear does, by wear and movement.
+    /// Effects of wear, by wear and movement.
     pub effects: Vec<SkinEffect>,
 }
 
-/// What a worn skin does to the properties at one movement.
+/// Effect of a worn skin on the properties at one movement.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SkinEffect {
     /// Wear, % of the ridges.
@@ -126,7 +126,7 @@ pub struct SkinEffect {
 pub struct TableFile {
     /// Name of the file.
     pub file: String,
-    /// What it holds.
+    /// Its contents.
     pub contents: String,
     /// Its length.
     pub bytes: usize,
@@ -138,7 +138,7 @@ pub struct TableFile {
 }
 
 impl Training {
-    /// What the trials say, and those with worn skins.
+    /// The results of these trials, and of those with worn skins.
     ///
     /// # Errors
     /// See [`StudyError`].
@@ -259,7 +259,7 @@ impl Training {
 
 /// Degree of confusion (eq. 7), by the core.
 fn degree(a: Gaussian, b: Gaussian) -> f32 {
-    confusion::<tactus_core::dsp::Plain>(a, b)
+    confusion(a, b)
 }
 
 /// Geometric mean of matrices, element by element.
@@ -368,7 +368,7 @@ impl Worn {
     }
 }
 
-/// What worn skins change against the first of them, which is new.
+/// Changes by worn skins against the first of them, which is new.
 fn skin_effects(worn: &[Worn], textures: &[Trained]) -> Vec<SkinEffect> {
     let Some(new) = worn.first() else {
         return Vec::new();

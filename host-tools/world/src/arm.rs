@@ -1,8 +1,8 @@
-//! An arm that holds the finger: what its joints do with the velocities that a program asks for. The program is elsewhere:
-//! [`crate::arm_program`], or one in another language.
+//! An arm that holds the finger: the motion of its joints under a program's commanded velocities. The program is
+//! elsewhere: [`crate::arm_program`], or one in another language.
 //!
-//! Its frame is the sample's, as somebody has measured it: the height is off by some tenths of a millimetre, and the sample is not
-//! level in it. So nobody knows where the sample is but by its force.
+//! Its frame is the sample's, as a person has measured it: the height is off by some tenths of a millimetre, and the
+//! sample is not level in it. So only the force shows where the sample is.
 
 use super::conditions::TICK_S;
 use super::noise::Noise;
@@ -10,13 +10,15 @@ use super::surface::LENGTH_MM;
 
 /// Stream of the seed that arms draw from.
 const STREAM: u64 = 0xa3;
-/// Fastest change of a velocity, mm/s^2, and how slowly an axis follows its command, s (chosen: a light arm at low speed).
+/// Fastest change of a velocity, mm/s^2, and how slowly an axis follows its command, s (chosen: a light arm at low
+/// speed).
 const ACCELERATION_MM_S2: f64 = 1000.0;
 const FOLLOWS_S: f64 = 0.01;
 /// Speed wanders by this share, rms, within this time, s (chosen: gears).
 const RIPPLE: f64 = 0.003;
 const RIPPLE_S: f64 = 0.03;
-/// Height by which the sample's top may be off, and by which it rises along its length, mm (chosen: a careful teach-in).
+/// Height by which the sample's top may be off, and by which it rises along its length, mm (chosen: a careful
+/// teach-in).
 const TOP_MM: (f64, f64) = (-0.5, 0.5);
 const SLOPE_MM: (f64, f64) = (-0.04, 0.04);
 /// Highest that it goes, mm.
@@ -26,19 +28,19 @@ const HIGHEST_MM: f64 = 60.0;
 #[derive(Clone, Debug)]
 pub struct Arm {
     noise: Noise,
-    /// Where the sample's top really is, mm, and how it rises.
+    /// True height of the sample's top, mm, and its slope.
     top_mm: f64,
     slope_mm: f64,
     x_mm: f64,
     height_mm: f64,
-    /// Along the sample and up: as wanted, and as they are, mm/s.
+    /// Velocity along the sample and up: commanded, and actual, mm/s.
     wanted_mm_s: [f64; 2],
     speed_mm_s: [f64; 2],
     ripple: f64,
 }
 
 impl Arm {
-    /// Where it stands when it gets its power, mm over the sample as it was measured.
+    /// Height at power-up over the sample as it was measured, mm.
     pub const BEGINS_MM: f64 = 10.0;
 
     /// An arm with its finger in the air, over the middle of the sample.
@@ -56,7 +58,7 @@ impl Arm {
         }
     }
 
-    /// Asks for velocities: along the sample, and up, mm/s. They hold until it is asked for others.
+    /// Commands velocities: along the sample, and up, mm/s. They hold until the next command.
     pub fn go(&mut self, along_mm_s: f64, up_mm_s: f64) {
         self.wanted_mm_s = [along_mm_s, up_mm_s];
     }
@@ -76,12 +78,12 @@ impl Arm {
         self.speed_mm_s[0]
     }
 
-    /// Whether it stands.
+    /// Returns true if it stands.
     pub fn stands(&self) -> bool {
         self.speed_mm_s.iter().all(|speed| speed.abs() < 0.02)
     }
 
-    /// How deep the sample is in the fingertip, mm; negative is a gap.
+    /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub fn indentation_mm(&self) -> f64 {
         let rises = self.slope_mm * (self.x_mm / LENGTH_MM - 0.5);
         self.top_mm + rises - self.height_mm

@@ -1,5 +1,5 @@
-//! What runs on an arm: a program that does what a probe asks for over its link, and reports. It has the probe's own force to press
-//! by, late, and the arm's encoders. It may also be a bad one: [`Misbehaves`].
+//! The program of an arm: it carries out a probe's orders that come over its link, and reports. It has the probe's
+//! force, late, and the arm's encoders. It may also be a bad one: [`Misbehaves`].
 
 use std::collections::VecDeque;
 
@@ -11,9 +11,9 @@ use super::surface::LENGTH_MM;
 
 /// Stream of the seed that the line draws from.
 const STREAM: u64 = 0xa4;
-/// A word is so long on its way, ms, either way: half of it to one and a half (chosen: USB, an interpreter, a bus to the arm).
+/// Delay of a message, ms, either way: half of it to one and a half (chosen: USB, an interpreter, a bus to the arm).
 const ON_ITS_WAY_MS: f64 = 15.0;
-/// From a stop that was heard until the axes are told, ms (chosen: a cycle of a slow controller).
+/// Time from a received stop until the axes have their command, ms (chosen: a cycle of a slow controller).
 const STOPS_MS: u64 = 20;
 /// Height of a lifted finger, and how fast it is lifted and moved in the air, mm and mm/s.
 const SAFE_MM: f64 = 8.0;
@@ -21,7 +21,7 @@ const LIFTS_MM_S: f64 = 30.0;
 const MOVES_MM_S: f64 = 60.0;
 /// Left free at both ends of the sample, mm.
 const MARGIN_MM: f64 = 2.0;
-/// Lower than that there is no sample, mm.
+/// Height below which there is no sample, mm.
 const LOWEST_MM: f64 = -4.0;
 /// Force that is contact, N, and speed for a newton that is missing, mm/s.
 const CONTACT_N: f64 = 0.03;
@@ -32,33 +32,33 @@ const RIGHT_MS: u32 = 100;
 /// A constant speed is within this share.
 const STEADY: f64 = 0.01;
 
-/// What may be wrong with an arm.
+/// Faults of an arm.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Misbehaves {
     /// It presses with so many times the force.
     Presses(f64),
     /// It comes down so fast, and does not look at the force: only a stop ends that, so many ms after it was heard.
     ComesDown {
-        /// How fast, mm/s.
+        /// Its speed, mm/s.
         mm_s: f64,
-        /// How late.
+        /// Its delay after a stop, ms.
         stops_ms: u64,
     },
     /// It presses too hard, and does not stop at all.
     NeverStops,
-    /// It says nothing any more, and does nothing new, so many ms after a slide has come to its speed.
+    /// It sends no reports any more, and does nothing new, so many ms after a slide has come to its speed.
     Silent(u64),
-    /// It says nothing, and goes on with the slide to its end.
+    /// It sends no reports, and continues the slide to its end.
     SilentAndGoesOn(u64),
-    /// It says that it presses, and does not touch anything.
+    /// It reports that it presses, and does not touch anything.
     SaysPressed,
-    /// It slides at this share of the speed, in the time of the whole length, and says that it made both.
+    /// It slides at this share of the speed, in the time of the whole length, and reports the full speed and length.
     SaysSpeed(f64),
-    /// It says that it is lifted, and stays where it is.
+    /// It reports that it has lifted the finger, and stays where it is.
     SaysLifted,
-    /// It slides only this share of the length, and says so.
+    /// It slides only this share of the length, and reports it.
     Shorter(f64),
-    /// It says that it cannot.
+    /// It reports that it cannot carry out the order.
     Fails,
 }
 
@@ -72,7 +72,7 @@ enum Doing {
     Ramps(ArmMovement),
     Slides(ArmMovement, f64, u64),
     Brakes(ArmMovement, u32, u32),
-    /// It has the stop, and does it then.
+    /// It obeys a stop after so many ms.
     Stops(u64),
     Stands,
     Lifts,
@@ -117,7 +117,7 @@ impl ArmProgram {
         }
     }
 
-    /// From now on something is wrong with it, or nothing any more.
+    /// Sets or clears its fault.
     pub fn misbehave(&mut self, how: Option<Misbehaves>) {
         self.misbehaves = how;
     }
@@ -126,13 +126,13 @@ impl ArmProgram {
         self.now_ms + (self.noise.between(0.5, 1.5) * ON_ITS_WAY_MS + 0.5) as u64
     }
 
-    /// The probe asks for this.
+    /// Takes an order of the probe.
     pub fn ask(&mut self, order: ArmOrder) {
         let at = self.later();
         self.to_it.push_back((at, order));
     }
 
-    /// The probe says its force, N.
+    /// Takes the probe's force, N.
     pub fn force(&mut self, newton: f64) {
         let at = self.later();
         self.forces.push_back((at, newton));
@@ -173,7 +173,7 @@ impl ArmProgram {
         };
     }
 
-    /// A millisecond: what the arm is asked for, and what the probe hears now.
+    /// A millisecond: commands the arm, and returns the report that reaches the probe now.
     pub fn tick(&mut self, arm: &mut Arm) -> Vec<ArmReport> {
         self.now_ms += 1;
         let now = self.now_ms;
@@ -208,7 +208,7 @@ impl ArmProgram {
         heard
     }
 
-    /// It has come so far, and says so at once.
+    /// Reports its progress at once.
     fn reach(&mut self, state: ArmState, doing: Doing) {
         self.state = state;
         self.doing = doing;
@@ -318,7 +318,7 @@ impl ArmProgram {
                 }
             }
             Doing::Stands => arm.go(0.0, 0.0),
-            // until then it goes on with what it did
+            // until then it continues its motion
             Doing::Stops(at_ms) if now < at_ms => {}
             Doing::Stops(_) => {
                 arm.go(0.0, 0.0);
@@ -344,7 +344,7 @@ impl ArmProgram {
     }
 }
 
-/// Where the slide of a movement begins, mm from the sample's edge.
+/// Place where the slide of a movement begins, mm from the sample's edge.
 fn begins_mm(movement: &ArmMovement) -> f64 {
     let speed = f64::from(movement.speed_um_s) * 1e-3;
     // two ramps, and what an axis is late

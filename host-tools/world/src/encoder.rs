@@ -1,5 +1,5 @@
-//! The stage's quadrature encoder: two lines in Gray code, A before B towards higher positions, and what a counter on them
-//! says, also with a wire cut.
+//! The stage's quadrature encoder: two lines in Gray code, A before B towards higher positions, and the reading of a
+//! counter on them, also with a wire cut.
 
 use std::collections::VecDeque;
 
@@ -20,7 +20,7 @@ pub enum Cut {
 /// The lines from this instant on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Edge {
-    /// When.
+    /// Its time, ns.
     pub at_ns: u64,
     /// Line A.
     pub a: bool,
@@ -37,9 +37,9 @@ pub struct Encoder {
     swapped: bool,
     /// counts of a mm
     per_mm: f64,
-    /// count - what [`Encoder::followed`] says
+    /// count - [`Encoder::followed`]
     offset: i64,
-    /// counts, when they were reached and how the lines were then, if somebody wants edges
+    /// counts, the times when they were reached and the levels of the lines then, if edges are kept
     passed: Option<VecDeque<(i64, Edge)>>,
     shown: (bool, bool),
 }
@@ -78,7 +78,7 @@ impl Encoder {
         }
     }
 
-    /// What the counter says with the stage at a position.
+    /// Reading of the counter with the stage at a position.
     pub fn count(&self, position_mm: f64) -> i32 {
         let followed = followed(self.counts(position_mm), self.cut);
         (self.offset + if self.swapped { -followed } else { followed }) as i32
@@ -90,14 +90,14 @@ impl Encoder {
         self.origin = (position_mm * self.per_mm).floor();
     }
 
-    /// Whether something drives lines A and B at the chip.
+    /// Returns true for each of the lines A and B that is driven at the chip.
     pub fn is_wired(&self) -> (bool, bool) {
         let cut = |line| self.cut == Some(line) || self.cut == Some(Cut::Both);
         (!cut(Cut::A), !cut(Cut::B))
     }
 
-    /// Exchanges lines A and B, or puts them right, at a time with the stage at a position. Edges of that tick that are yet to
-    /// come are changed.
+    /// Exchanges lines A and B, or puts them right, at a time with the stage at a position. Edges of that tick that are
+    /// yet to come are changed.
     pub fn swap(&mut self, swapped: bool, position_mm: f64, now_ns: u64) {
         if swapped == self.swapped {
             return;
@@ -109,8 +109,8 @@ impl Encoder {
         self.rewire(self.counts(position_mm), now_ns);
     }
 
-    /// Cuts wires, or joins them again, at a time with the stage at a position. Edges of that tick that are yet to come are
-    /// changed.
+    /// Cuts wires, or joins them again, at a time with the stage at a position. Edges of that tick that are yet to come
+    /// are changed.
     pub fn set_cut(&mut self, cut: Option<Cut>, position_mm: f64, now_ns: u64) {
         if cut == self.cut {
             return;
@@ -170,7 +170,7 @@ fn lines(count: i64, cut: Option<Cut>) -> (bool, bool) {
     }
 }
 
-/// What a counter makes of an edge; two lines at once are nothing to it.
+/// Steps of a counter at an edge; it ignores a change of both lines at once.
 fn step(from: (bool, bool), to: (bool, bool)) -> i64 {
     let quarter = |(a, b): (bool, bool)| match (a, b) {
         (false, false) => 0,
@@ -185,7 +185,7 @@ fn step(from: (bool, bool), to: (bool, bool)) -> i64 {
     }
 }
 
-/// What a counter adds up to from the lines of a count, but for an offset.
+/// Counts that a counter adds up to from the lines of a count, but for an offset.
 fn followed(count: i64, cut: Option<Cut>) -> i64 {
     match (cut, lines(count, cut)) {
         (None, _) => count,

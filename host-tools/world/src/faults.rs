@@ -1,4 +1,4 @@
-//! What can go wrong with the rig, and what it does to the words on the way from the sensor.
+//! Faults of the rig, and their effect on the words on the way from the sensor.
 
 use super::encoder::Cut;
 use super::maths::pow;
@@ -25,7 +25,7 @@ pub enum Fault {
     },
     /// MISO is shorted to a level.
     MisoStuck {
-        /// Which level.
+        /// Its level.
         high: bool,
     },
     /// The sensor's converter hangs: the last word of each channel comes again and again, with good parity.
@@ -35,14 +35,14 @@ pub enum Fault {
         /// Counts of P_DC per second, of either sign.
         counts_per_s: f64,
     },
-    /// The converter of the static pressure sticks: P_DC says the same from now on, while P_AC lives.
+    /// The converter of the static pressure sticks: P_DC stays the same from now on, while P_AC lives.
     PdcStuck,
-    /// The amplifier of the static pressure loses its gain: P_DC goes back to what it says at rest, while P_AC lives.
+    /// The amplifier of the static pressure loses its gain: P_DC returns to its value at rest, while P_AC lives.
     PdcFades {
         /// Time in which the gain falls to 1/e, s; 0: it is gone at once.
         seconds: f64,
     },
-    /// The amplifier of the static pressure has this gain of a sound one's: P_DC says less than there is, while P_AC lives.
+    /// The amplifier of the static pressure has this gain of a sound one's: P_DC reads too low, while P_AC lives.
     PdcWeak {
         /// 0 to 1.
         gain: f64,
@@ -54,7 +54,7 @@ pub enum Fault {
     },
     /// The stage is held by something; its motor can still push.
     StageJammed,
-    /// The stage's bridge is off, whatever its enable says.
+    /// The stage's bridge is off, even when it is enabled.
     BridgeOff,
     /// The stage's bridge is off while its PWM is low, and lets the motor coast.
     FastDecay,
@@ -67,7 +67,7 @@ pub enum Fault {
     EncoderCut(Cut),
     /// The wires of the encoder are exchanged: it counts backwards.
     EncoderSwapped,
-    /// The amplifier of the motor current says so much more than there is.
+    /// The amplifier of the motor current reads this much too high.
     CurrentOffset {
         /// A, of either sign.
         amperes: f64,
@@ -76,7 +76,7 @@ pub enum Fault {
     CurrentSaturated,
     /// The supply of both motors is gone for so long.
     SupplyDip {
-        /// How long, ms.
+        /// Duration, ms.
         ms: u64,
     },
     /// A limit switch of the stage sticks.
@@ -93,7 +93,7 @@ pub enum Fault {
     },
     /// The limit switches' contacts bounce: each goes to and fro for so long whenever it opens or closes.
     SwitchesBounce {
-        /// How long, ms.
+        /// Duration, ms.
         ms: u64,
     },
     /// The lever misses this share of its steps.
@@ -101,17 +101,17 @@ pub enum Fault {
         /// 0 to 1.
         share: f64,
     },
-    /// The lever's driver steps down on its own with 800 steps/s, until its enable is taken away or STEP asked for more
-    /// steps up than it made by itself.
+    /// The lever's driver steps down on its own with 800 steps/s, until its enable is taken away or STEP has commanded
+    /// more steps up than it made by itself.
     LeverRunaway,
     /// The wire of the lever's DIR comes in inverted: up is down.
     LeverDirInverted,
-    /// Somebody presses the emergency stop. One contact is for the firmware to see, and bounces; the other one takes the
+    /// A person presses the emergency stop. The firmware sees one contact, which bounces; the other one takes the
     /// supply of both motors.
     EStop,
     /// A disturbance on the wire of the stop's first contact.
     EStopGlitch {
-        /// How long it reads as pressed, us.
+        /// Duration for which it reads as pressed, us.
         us: u64,
     },
 }
@@ -169,8 +169,8 @@ impl Fault {
         Self::EStopGlitch { us: 1_000 },
     ];
 
-    /// The same kind of fault to another degree, `share` of the way from the smallest to the largest that is to be expected;
-    /// itself where there is but one.
+    /// The same kind of fault to another degree, `share` of the way from the smallest to the largest that is to be
+    /// expected; itself where there is but one.
     #[must_use]
     pub fn varied(self, share: f64) -> Self {
         let between = |low: f64, high: f64| low * pow(high / low, share);
@@ -211,7 +211,7 @@ impl Fault {
     }
 }
 
-/// The faults that are there now, as far as they are not the finger's, the lever's, the stage's or the encoder's own.
+/// The present faults, without those of the finger, the lever, the stage and the encoder.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults {
     pub(super) e_stop: Stop,
@@ -231,7 +231,7 @@ pub(super) struct Faults {
 }
 
 impl Faults {
-    /// What the amplifier of the motor current makes of a reading.
+    /// Reading behind the amplifier of the motor current, for a reading of a sound one.
     pub(super) fn amplified(&self, reading: u16) -> u16 {
         let off = self.current.unwrap_or_default() * ADC_V_PER_A * 4096.0 / ADC_REFERENCE_V;
         // the addition saturates at both ends, as the amplifier does
@@ -239,7 +239,7 @@ impl Faults {
     }
 }
 
-/// How long the emergency stop's contact bounces, ns, and how long it stays as it is meanwhile (chosen: usual for a
+/// Time for which the emergency stop's contact bounces, and the time between changes meanwhile, ns (chosen: usual for a
 /// mushroom button).
 pub const BOUNCES_NS: u64 = 4_000_000;
 const BOUNCE_NS: u64 = 350_000;
@@ -261,12 +261,12 @@ impl Stop {
         self.glitch_ns = (now_ns, now_ns + 1000 * us);
     }
 
-    /// Whether the supply of the motors is off.
+    /// Returns true if the supply of the motors is off.
     pub(super) fn cuts_power(self) -> bool {
         self.pressed_ns.is_some()
     }
 
-    /// Whether the contact that the firmware sees is open.
+    /// Returns true if the firmware's contact is open.
     pub(super) fn is_open(self, now_ns: u64) -> bool {
         let (from_ns, to_ns) = self.glitch_ns;
         // it opens first, and bounces
@@ -277,8 +277,8 @@ impl Stop {
     }
 }
 
-/// Whether a contact that has changed at `since_ns`, and bounces for `lasts_ns`, is as it was before: every third time, seen
-/// from any instant of power-up.
+/// Returns true if a contact that has changed at `since_ns`, and bounces for `lasts_ns`, is as it was before: every
+/// third time, seen from any instant of power-up.
 fn is_back(since_ns: u64, now_ns: u64, lasts_ns: u64) -> bool {
     let after_ns = now_ns.saturating_sub(since_ns);
     let bounce = after_ns / BOUNCE_NS;
@@ -301,7 +301,7 @@ impl Switches {
         self.were = now.map(|closed| (closed, 0));
     }
 
-    /// The switches are so at this time.
+    /// Takes the switches at this time.
     pub(super) fn watch(&mut self, now: [bool; 3], at_ns: u64) {
         if self.bounce_ns == 0 {
             return;
@@ -313,7 +313,7 @@ impl Switches {
         }
     }
 
-    /// What their contacts say.
+    /// Levels of their contacts.
     pub(super) fn read(&self, now: [bool; 3], at_ns: u64) -> [bool; 3] {
         std::array::from_fn(|n| {
             self.stuck[n].unwrap_or(now[n] ^ is_back(self.were[n].1, at_ns, self.bounce_ns))
@@ -324,7 +324,7 @@ impl Switches {
 /// Command that samples the static pressure (SPM table 7).
 const SAMPLE_PDC: u8 = 0x83;
 
-/// The wire from the sensor: what MISO says, given what the sensor sent.
+/// The wire from the sensor: the level of MISO for each byte that the sensor sent.
 #[derive(Clone, Debug)]
 pub(super) struct Miso {
     command: u8,
@@ -344,7 +344,7 @@ impl Miso {
 
     /// Changes what the sensor puts on the line in answer to a transfer that begins with `mosi`.
     pub(super) fn pass(&mut self, now_ns: u64, mosi: u8, line: &mut [u8], faults: &Faults) {
-        // a read says 00 first, every command something else
+        // a read begins with 00, every command with another byte
         if mosi != 0 {
             self.command = mosi;
         } else if let [byte0, byte1, ..] = line {
@@ -378,7 +378,7 @@ impl Miso {
         }
     }
 
-    /// What comes of a byte that a part of another finger than a BioTac says.
+    /// The byte of a part of a finger other than a BioTac, after the wire's faults.
     pub(super) fn disturb(&mut self, said: u8, faults: &Faults) -> u8 {
         if faults.miso_stuck.is_some() {
             return Self::idle(faults);
@@ -390,7 +390,7 @@ impl Miso {
         said
     }
 
-    /// What the line reads as with nobody driving it: its pull-up, or what it is shorted to.
+    /// Level of a line that nothing drives: its pull-up, or the level that it is shorted to.
     pub(super) fn idle(faults: &Faults) -> u8 {
         match faults.miso_stuck {
             Some(false) => 0x00,
@@ -399,7 +399,8 @@ impl Miso {
     }
 }
 
-/// Whether a word has odd parity in both bytes, as samples have, and neither error frames nor a floating line.
+/// Returns true if a word has odd parity in both bytes, as samples have, and is neither an error frame nor a floating
+/// line.
 fn is_sample(word: [u8; 2]) -> bool {
     word.iter().all(|byte| byte.count_ones() % 2 == 1)
 }

@@ -1,17 +1,17 @@
-//! The finger: what a contact does to its skin, and to its fluid or its other transducers.
+//! The finger: the effects of a contact on its skin, and on its fluid or its other transducers.
 //!
-//! A tick goes: the skin is indented (`skin`), sticks or slips along the surface, ridges and fluid turn what they slide
-//! over into pressure (`vibration`), and the amplifiers make the two signals that the sensor samples (`amplifier`). Fingers without a
-//! fluid have other transducers in its place (`signals`); their skin of solid silicone of Shore 10 A to 20 A is a Hertz contact
-//! of about the same stiffness.
+//! A tick goes: the skin is indented (`skin`), sticks or slips along the surface, ridges and fluid turn the surface
+//! into pressure (`vibration`), and the amplifiers make the two signals that the sensor samples (`amplifier`). Fingers
+//! without a fluid have other transducers in its place (`signals`); their skin of solid silicone of Shore 10 A to 20 A
+//! is a Hertz contact of about the same stiffness.
 
 mod amplifier;
 mod analog;
 mod cell;
-mod felt;
 mod mems;
 mod signals;
 mod skin;
+mod stimulus;
 mod vibration;
 
 use super::conditions::{Conditions, TICK_S};
@@ -22,11 +22,11 @@ use super::played::{PlayCounts, Playback, Played};
 use super::surface::Surface;
 use super::textures::Texture;
 use amplifier::Amplifiers;
-pub(super) use felt::Felt;
-pub use felt::Held;
 use signals::newtons;
 pub(super) use signals::{FLUID_PA_PER_G, Signals};
 use skin::Skin;
+pub use stimulus::Held;
+pub(super) use stimulus::Stimulus;
 use tactus_core::sensor::FingerName;
 use vibration::Vibrations;
 
@@ -51,8 +51,8 @@ mod touch {
     pub(super) const RESONANCE: f64 = 0.03;
 }
 
-/// Relative deviation of friction while it slides at 25 mm/s, growing with the root of speed (chosen; PAPER: slow slides
-/// are the more stable).
+/// Relative deviation of friction while it slides at 25 mm/s, growing with the root of speed (chosen; PAPER: slow
+/// slides are the more stable).
 const UNSTEADY: f64 = 0.02;
 /// Speed for the above, mm/s.
 const UNSTEADY_AT_MM_S: f64 = 25.0;
@@ -66,8 +66,8 @@ const SHEAR_TO_PDC: f64 = 0.03;
 /// Friction changes slowly along a sample: it is looked up every so many ticks.
 const FRICTION_TICKS: u32 = 8;
 
-/// Sliding energy after which the ridges are gone, at low power, J. Chosen so that the paper's 117 * 15 slides, some 50 J,
-/// take about the two skins that they took, each replaced at the first visible sign of wear.
+/// Sliding energy after which the ridges are gone, at low power, J. Chosen so that the paper's 117 * 15 slides, some 50
+/// J, take about the two skins that they took, each replaced at the first visible sign of wear.
 const SKIN_LIFE_J: f64 = 200.0;
 /// Sliding power at which a joule wears twice as much as at low power, mW (chosen: the paper's movements, all of
 /// 12.6 mW times the coefficient of friction, wear little; those it avoided for wear are above 20 mW).
@@ -79,18 +79,19 @@ fn wear_per_s(power_mw: f64) -> f64 {
     1e-3 * power_mw / SKIN_LIFE_J * (1.0 + excess * excess)
 }
 
-/// Wear that sliding over a texture takes, for each mm: what [`Finger::wear`] will grow by, but for the variation of touches.
+/// Wear that sliding over a texture takes, for each mm: what [`Finger::wear`] will grow by, but for the variation of
+/// touches.
 pub fn wear_per_mm(texture: &Texture, force_n: f64, speed_mm_s: f64) -> f64 {
     let power_mw = texture.mean_friction(speed_mm_s, force_n) * force_n * speed_mm_s;
     wear_per_s(power_mw) / speed_mm_s
 }
 
-/// What the finger touches and how it moves.
+/// The surface under the finger and the finger's motion.
 #[derive(Clone, Copy)]
 pub struct Contact<'a> {
-    /// How far the skin is pressed against the surface, mm; not touching if not above 0.
+    /// Depth by which the skin is pressed against the surface, mm; not touching if not above 0.
     pub indentation_mm: f64,
-    /// What is under the finger.
+    /// The surface under the finger.
     pub surface: Option<&'a Surface>,
     /// Position of the finger on the sample, mm.
     pub x_mm: f64,
@@ -130,7 +131,8 @@ pub struct Finger {
     slipping: bool,
     shear_n: f64,
     wear: f64,
-    /// time in which the fluid's pressure runs out of a torn skin, s, and the force that it no longer carries, N (faults)
+    /// time in which the fluid's pressure runs out of a torn skin, s, and the force that it no longer carries, N
+    /// (faults)
     leak_s: Option<f64>,
     leaked_n: f64,
     /// recorded slides instead of what the surface does
@@ -143,8 +145,8 @@ impl Finger {
         Self::under([seed; 2], Conditions::default())
     }
 
-    /// A finger under other conditions than the usual ones. The first seed draws what it was made like, the second one what
-    /// happens in this trial: its landings and its noise.
+    /// A finger under other conditions than the usual ones. The first seed draws its properties, the second one the
+    /// events of this trial: its landings and its noise.
     pub fn under([made, trial]: [u64; 2], conditions: Conditions) -> Self {
         let mut noise = Noise::new(trial, 500);
         Self {
@@ -206,13 +208,13 @@ impl Finger {
         }
     }
 
-    /// Feeds the transducers alone, without a contact: for tests of what is behind them. An accelerometer feels as many g as the
-    /// vibration has newtons, without the silicone's resonance.
+    /// Feeds the transducers alone, without a contact: for tests of the chain behind them. An accelerometer feels as
+    /// many g as the vibration has newtons, without the silicone's resonance.
     #[cfg(test)]
-    pub(super) fn feed(&mut self, felt: &Felt) {
-        self.signals.tick(felt, &mut self.noise);
+    pub(super) fn feed(&mut self, stimulus: &Stimulus) {
+        self.signals.tick(stimulus, &mut self.noise);
         if let Signals::Mems(mems) = &mut self.signals {
-            mems.feed(felt.held.down + felt.vibration_n);
+            mems.feed(stimulus.held.down + stimulus.vibration_n);
         }
     }
 
@@ -236,7 +238,7 @@ impl Finger {
         self.playback = (!slides.is_empty()).then(|| Playback::new(slides, seed));
     }
 
-    /// What has been played.
+    /// Counts of the slides and samples played so far.
     pub fn played(&self) -> PlayCounts {
         self.playback
             .as_ref()
@@ -269,7 +271,7 @@ impl Finger {
             .fluid(pressure_pa + PA_PER_N * force, force, detuned);
         let dc_n = force + SHEAR_TO_PDC * self.shear_n.abs();
         let lever_g = contact.lever_vibration / FLUID_PA_PER_G;
-        let felt = Felt {
+        let stimulus = Stimulus {
             fluid_pa,
             slow_pa: PA_PER_N * dc_n,
             force_n: self.skin.force_n(),
@@ -280,11 +282,11 @@ impl Finger {
                 ..self.held
             },
         };
-        self.signals.tick(&felt, &mut self.noise);
+        self.signals.tick(&stimulus, &mut self.noise);
     }
 
-    /// What of the force the fluid carries at this tick, N. What has run out of a torn skin does not come back; a slack
-    /// skin has no pressure below that of the air.
+    /// Part of the force that the fluid carries at this tick, N. Fluid that has run out of a torn skin does not come
+    /// back; a slack skin has no pressure below that of the air.
     fn carried_n(&mut self) -> f64 {
         let Some(seconds) = self.leak_s else {
             return self.skin.fluid_n();
@@ -353,7 +355,8 @@ impl Finger {
         touch
     }
 
-    /// Sticks, breaks away or slips: the skin stretches until static friction gives way, then kinetic friction holds it.
+    /// Sticks, breaks away or slips: the skin stretches until static friction gives way, then kinetic friction holds
+    /// it.
     fn shear(&mut self, speed_mm_s: f64, load_n: f64, stiction: f64, touch: Touch) {
         let memory = TICK_S / UNSTEADY_S;
         let kick = (2.0 * memory).sqrt() * UNSTEADY * (speed_mm_s.abs() / UNSTEADY_AT_MM_S).sqrt();
@@ -443,7 +446,7 @@ impl Finger {
         self.sample_channel(1, fraction)
     }
 
-    /// What a converter of 12 bits reads of P_AC (0) or P_DC (1). An accelerometer has none.
+    /// Reading of a converter of 12 bits on P_AC (0) or P_DC (1). An accelerometer has none.
     pub(super) fn sample_channel(&mut self, channel: u8, fraction: f64) -> u16 {
         let noise = &mut self.noise;
         let amplifiers = match &mut self.signals {

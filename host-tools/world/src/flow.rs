@@ -1,12 +1,12 @@
-//! The optical sensor of motion in the simulated world: a PAA5100JE as its data sheet and its users describe it, byte by byte on the bus.
-//! It knows nothing of the driver.
+//! The optical sensor of motion in the simulated world: a PAA5100JE as its data sheet and its users describe it, byte
+//! by byte on the bus. It knows nothing of the driver.
 //!
-//! It counts what passes under it, 228 counts per mm and mm of height, frame by frame, 242 a second. Too near, too far, in the
-//! air, and over what has no features it sees nothing. An access that comes too soon after the one before is lost. After
-//! long stillness it stops until it is reset (users report it; the time is chosen).
+//! It counts the surface that passes under it, 228 counts per mm and mm of height, frame by frame, 242 a second. Too
+//! near, too far, in the air, and over a surface without features it sees nothing. An access that comes too soon after
+//! the one before is lost. After long stillness it stops until it is reset (users report it; the time is chosen).
 //!
-//! Not confirmed by a document that I could read: that registers of the maker's list read back as written, its error from frame to
-//! frame, what it says of the surface while it sees it, and its speed limit.
+//! Four points are not confirmed by a document that I could read: registers of the maker's list read back as written,
+//! its error from frame to frame, its report of the surface while it sees it, and its speed limit.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ const STREAM: u64 = 0xf10;
 pub const HEIGHT_MM: f64 = 25.0;
 /// Counts per mm, times the height in mm.
 const SCALE: f64 = 228.0;
-/// Where it sees, mm.
+/// Range of height in which it sees, mm.
 const SEES_MM: std::ops::RangeInclusive<f64> = 15.0..=35.0;
 /// Time of a frame, ns.
 const FRAME_NS: u64 = 1_000_000_000 / 242;
@@ -39,10 +39,10 @@ pub const BYTE_NS: u64 = 4_000;
 const RESET_NS: u64 = 15_000_000;
 /// Stillness after which it stops, ns (chosen).
 const STOPS_NS: u64 = 600_000_000_000;
-/// What an input reads that nobody drives.
+/// Reading of an input that nothing drives.
 const FLOATING: u8 = 0xFF;
 
-/// What is under it.
+/// The surface under it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Ground {
     /// A surface with features, so many mm below.
@@ -127,7 +127,8 @@ impl Flow {
         self.refused
     }
 
-    /// Whether it was set up after the last reset: its lamp is on, and the last write of the maker's list was made.
+    /// Returns true if it was set up after the last reset: its lamp is on, and the last write of the maker's list was
+    /// made.
     pub fn is_set_up(&self) -> bool {
         let is = |bank, register, value| self.registers.get(&(bank, register)) == Some(&value);
         is(0x14, 0x6F, 0x1C) && is(0x00, 0x73, 0x00) && is(0x00, 0x5A, 0x90)
@@ -157,7 +158,7 @@ impl Flow {
         (self.at_ns, self.x_mm) = (now_ns, x_mm);
     }
 
-    /// Height over what it sees; `None` where it sees nothing.
+    /// Height over the surface; `None` if it sees none.
     fn height_mm(&self) -> Option<f64> {
         let stopped = self.frame_ns.saturating_sub(self.moved_ns) > STOPS_NS;
         match self.ground {
@@ -172,7 +173,7 @@ impl Flow {
         self.spoiled = false;
     }
 
-    /// A byte goes over the bus in mode 3, from and until then: what it answers.
+    /// A byte goes over the bus in mode 3, from and until then; returns its answer.
     pub fn byte(&mut self, begins_ns: u64, ends_ns: u64, mosi: u8) -> u8 {
         if self.unplugged {
             return FLOATING;
@@ -257,7 +258,7 @@ impl Flow {
         }
     }
 
-    /// What a burst gives; what was counted is read then.
+    /// The bytes of a burst; it resets the counts.
     fn latch(&mut self) -> [u8; 12] {
         let sees = self.height_mm().is_some();
         let counts = self.counts.trunc();

@@ -1,15 +1,15 @@
 //! The lever that presses the fingertip on the sample: a stepper with a lead screw behind a STEP/DIR/EN driver.
 //!
-//! Reference lever of the project: 200 steps x 1/16, lead 2 mm, so 0.625 um per microstep and 800 steps/s at the paper's
-//! 0.5 mm/s. Figures marked "chosen" are of a common NEMA 14 motor on 12 V; the paper names only its motor (L4118, Nanotec)
-//! and that it hums differently from trial to trial, even when it stands.
+//! Reference lever of the project: 200 steps x 1/16, lead 2 mm, so 0.625 um per microstep and 800 steps/s at the
+//! paper's 0.5 mm/s. Figures marked "chosen" are of a common NEMA 14 motor on 12 V; the paper names only its motor
+//! (L4118, Nanotec) and that it hums differently from trial to trial, even when it stands.
 //!
 //! The driver's currents point to a microstep, the *field*; the rotor follows it to the nearest place where they agree,
-//! which repeats every 64 microsteps. That is all there is to losing steps: a rotor that is left behind by more than half
-//! of that snaps into another period, always a whole number of them away.
+//! which repeats every 64 microsteps. Lost steps follow from that: a rotor that is left behind by more than half of
+//! that snaps into another period, always a whole number of them away.
 //!
-//! The screw locks itself: its thread (Tr8x2) rises by 5.2 degrees, and steel on brass holds up to 8.5. Without current the
-//! lever stays where it is, whatever pushes; only its knob moves it.
+//! The screw locks itself: its thread (Tr8x2) rises by 5.2 degrees, and steel on brass holds up to 8.5. Without current
+//! the lever stays where it is under any force; only its knob moves it.
 
 use std::f64::consts::TAU;
 
@@ -31,7 +31,7 @@ pub const START_STOP_PER_S: f64 = 6_400.0;
 pub const TOP_PER_S: f64 = 24_000.0;
 /// Steepest ramp above the start/stop rate, microsteps/s^2; 200 mm/s^2 (chosen).
 pub const RAMP_PER_S2: f64 = 320_000.0;
-/// How much above the ramp a single interval may look: STEP from software jitters (chosen).
+/// Tolerance of a single interval above the ramp: STEP from software jitters (chosen).
 const RATE_SLACK: f64 = 1.02;
 /// Load that the standing motor holds, N (chosen); falls linearly to nothing at [`TOP_PER_S`].
 pub const HOLD_N: f64 = 12.0;
@@ -39,8 +39,8 @@ pub const HOLD_N: f64 = 12.0;
 pub const BACKLASH_UM: f64 = 15.0;
 /// Finger force that overcomes the lever's own friction and closes the play, N (chosen).
 const CLOSES_PLAY_N: f64 = 0.05;
-/// Largest error of a microstep's place, um: 5 % of a full step, not accumulating (usual for such motors), once per full
-/// step and once per period.
+/// Largest error of a microstep's place, um: 5 % of a full step, not accumulating (usual for such motors), once per
+/// full step and once per period.
 const STEP_ERROR_UM: [f64; 2] = [0.25, 0.25];
 /// Height of the fingertip over the steel plate with the lever at the upper hard stop, mm (chosen: over every sample;
 /// foams and furs have 6 to 15 mm, so that some touch the finger before it has homed).
@@ -121,7 +121,7 @@ impl Pin {
 #[derive(Clone, Copy, Default, Debug)]
 struct Runaway {
     due: f64,
-    /// its own steps down, and the steps up that were asked for since it began
+    /// its own steps down, and the steps up that were commanded since it began
     down: u64,
     up: u64,
 }
@@ -194,7 +194,7 @@ impl Lever {
                 self.take_step(at_ns, sign, load_n);
             }
         } else if !long_enough {
-            // the driver never saw this pulse: what it did 4 us ago is undone
+            // the driver never saw this pulse: its step of 4 us ago is undone
             self.bad_pulses += 1;
             if self.last_edge_stepped {
                 self.last_edge_stepped = false;
@@ -214,8 +214,8 @@ impl Lever {
         }
     }
 
-    /// The level of EN: high gives current. Without it the driver still counts steps, as an A4988 does, but the rotor stays
-    /// where it is, and snaps to the nearest fitting place when the current returns.
+    /// The level of EN: high gives current. Without it the driver still counts steps, as an A4988 does, but the rotor
+    /// stays where it is, and snaps to the nearest fitting place when the current returns.
     pub fn enable(&mut self, high: bool, load_n: f64) {
         if high == self.enabled {
             return;
@@ -259,7 +259,7 @@ impl Lever {
         self.height_mm
     }
 
-    /// How the motor shakes the finger: pressure that this makes in its fluid, Pa; 0 without current.
+    /// Pressure in the finger's fluid by the motor's vibration, Pa; 0 without current.
     pub fn vibration_pa(&self) -> f64 {
         self.vibration.value()
     }
@@ -274,7 +274,7 @@ impl Lever {
         self.held = held;
     }
 
-    /// Steps down that STEP edges asked for and the rotor did not make, less those up.
+    /// Steps down that STEP edges commanded and the rotor did not make, less those up.
     pub fn missing_steps(&self) -> f64 {
         self.asked as f64 - (self.rotor - self.began_at)
     }
@@ -284,7 +284,7 @@ impl Lever {
         self.bad_pulses
     }
 
-    /// From now on DIR says the opposite; `false` ends it.
+    /// Inverts DIR from now on; `false` ends it.
     pub fn invert_dir(&mut self, on: bool) {
         self.inverted = on;
     }
@@ -312,8 +312,8 @@ impl Lever {
         self.lost_share = share;
     }
 
-    /// From now on the driver steps down by itself, [`RUNAWAY_PER_S`], until the current is off or more steps up were asked
-    /// for than it made; `false` ends it.
+    /// From now on the driver steps down by itself, [`RUNAWAY_PER_S`], until the current is off or more steps up were
+    /// commanded than it made; `false` ends it.
     pub fn run_away_down(&mut self, on: bool) {
         self.runaway = on.then(Runaway::default);
     }
@@ -355,7 +355,7 @@ impl Lever {
         }
     }
 
-    /// Loses hold: the rotor goes on to the next place of the same currents.
+    /// Loses hold: the rotor moves to the next place of the same currents.
     fn slip(&mut self, direction: i64, load_n: f64) {
         self.turn((PERIOD * direction) as f64, load_n);
     }
@@ -421,8 +421,8 @@ fn pull_out_n(rate: f64) -> f64 {
     HOLD_N * (1.0 - rate / TOP_PER_S).max(0.0)
 }
 
-/// What an energised motor does to a finger: a few tones, drawn anew at every stop, since the motor stands at another
-/// balance of its two phase currents each time.
+/// The effect of an energised motor on a finger: a few tones, drawn anew at every stop, since the motor stands at
+/// another balance of its two phase currents each time.
 #[derive(Clone, Debug)]
 struct Hum([Tone; HUM_TONES]);
 

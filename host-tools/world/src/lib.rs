@@ -1,10 +1,11 @@
 //! The simulated world: textures, their surfaces, the finger that touches them, and the sensor's words.
 //!
-//! Everything here is physics and protocol. It knows nothing of the features, tables and decisions of the core and may not
-//! import them (a test looks; recordings and learning are in crates that it does not know): what is simulated has to be hard to fool. Every constant is a figure of the paper (PAPER:
-//! Fishel & Loeb 2012), of the makers' documents or says "chosen". The documents
-//! are SPM: BioTac SP Product Manual V2 (2015), whose protocol is the BioTac's; HDR and LIB: SynTouch's biotac.h and biotac.c
-//! (kth-ros-pkg/biotac_driver); OUT: 39 600 recorded samples (CNCR-NTU/biotac_sp_ros, output.txt).
+//! Everything here is physics and protocol. It knows nothing of the features, tables and decisions of the core and may
+//! not import them (a test looks; recordings and learning are in crates that it does not know): the simulation has to
+//! be hard to fool. Every constant is a figure of the paper (PAPER: Fishel & Loeb 2012), of the makers' documents or
+//! says "chosen". The documents are SPM: BioTac SP Product Manual V2 (2015), whose protocol is the BioTac's; HDR and
+//! LIB: SynTouch's biotac.h and biotac.c (kth-ros-pkg/biotac_driver); OUT: 39 600 recorded samples
+//! (CNCR-NTU/biotac_sp_ros, output.txt).
 //!
 //! A world is its seeds: the same seeds give the same words, bit for bit on every machine.
 

@@ -1,5 +1,5 @@
-//! Functions of real numbers that IEEE 754 leaves to a library, from `libm`: a platform's own differ in the last bit, and a
-//! world would be another one there. Clippy keeps std's out of this room (`disallowed-methods`).
+//! Functions of real numbers that IEEE 754 leaves to a library, from `libm`: a platform's own differ in the last bit,
+//! and a world would be another one there. Clippy forbids std's in this crate (`disallowed-methods`).
 
 pub use libm::{cbrt, cos, exp, log as ln, pow, sin, sincos as sin_cos, tan};
 

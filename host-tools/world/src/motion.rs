@@ -13,7 +13,7 @@ struct Bus {
     flow: Flow,
     now_ns: u64,
     x_mm: f64,
-    /// Pauses are so many times as long as they should be.
+    /// Factor on the pauses.
     pauses: f64,
 }
 
@@ -82,7 +82,7 @@ impl MotionSensor {
         &mut self.driver.bus().flow
     }
 
-    /// What the driver makes of it when the probe has come here at that time.
+    /// The driver's counts when the probe has come here at that time.
     pub fn poll(&mut self, at_ns: u64, x_mm: f64) -> Option<[i16; 2]> {
         let bus = self.driver.bus();
         bus.x_mm = x_mm;

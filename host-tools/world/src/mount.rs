@@ -1,6 +1,6 @@
-//! What the fingertip is fixed to: stiff, or a spring that yields before the finger is hurt.
+//! The mount of the fingertip: stiff, or a spring that yields before the finger is hurt.
 
-/// Stiffer than a finger is on its core, N/mm: how fast the spring finds its place.
+/// Stiffness above that of a finger on its core, N/mm: sets the speed at which the spring finds its place.
 const SETTLES_N_PER_MM: f64 = 20.0;
 
 /// A spring between lever and finger, preloaded against a stop: stiff up to its preload, soft beyond.
@@ -8,7 +8,7 @@ const SETTLES_N_PER_MM: f64 = 20.0;
 pub struct Mount {
     preload_n: f64,
     n_per_mm: f64,
-    /// How far the finger has been pushed back, mm.
+    /// Yield of the spring, mm.
     pushed_mm: f64,
 }
 
@@ -19,15 +19,16 @@ impl Mount {
         n_per_mm: 0.0,
         pushed_mm: 0.0,
     };
-    /// The one that the book's list of parts names. It lies still at the probe's forces, 1.26 N and what a slide adds; and the
-    /// lever's whole travel of 16 mm makes no more of it than 2.1 N.
+    /// The one that the book's list of parts names. It lies still at the probe's forces, 1.26 N and what a slide adds;
+    /// and the lever's whole travel of 16 mm makes no more of it than 2.1 N.
     pub const SPRUNG: Self = Self {
         preload_n: 1.45,
         n_per_mm: 0.04,
         pushed_mm: 0.0,
     };
 
-    /// The one of a rig that is to press 2 N: it lies still at that, and the lever's whole travel makes no more of it than 2.2 N.
+    /// The one of a rig that is to press 2 N: it lies still at that, and the lever's whole travel makes no more of it
+    /// than 2.2 N.
     pub const FOR_2_N: Self = Self {
         preload_n: 2.05,
         n_per_mm: 0.009,
@@ -40,7 +41,7 @@ impl Mount {
         self.pushed_mm = (self.pushed_mm + over_n / SETTLES_N_PER_MM).max(0.0);
     }
 
-    /// How far the finger has been pushed back, mm.
+    /// Yield of the spring, mm.
     pub fn pushed_mm(&self) -> f64 {
         self.pushed_mm
     }

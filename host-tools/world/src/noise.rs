@@ -45,8 +45,8 @@ impl Noise {
         deviation * self.normal().clamp(-2.5, 2.5)
     }
 
-    /// Two independent numbers of mean 0 and variance 1 for noise at every tick: sums of two uniform ones, which filters
-    /// make normal, and ten times as fast as [`normal`](Self::normal).
+    /// Two independent numbers of mean 0 and variance 1 for noise at every tick: sums of two uniform ones, which
+    /// filters make normal, and ten times as fast as [`normal`](Self::normal).
     pub fn white(&mut self) -> [f64; 2] {
         // each sum of two 16-bit numbers: mean 65535, variance 2 * 65536^2 / 12
         const DEVIATION: f64 = 65_536.0 * 0.408_248_290_463_863;

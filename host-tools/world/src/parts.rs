@@ -1,5 +1,5 @@
-//! The parts of fingers that can be ordered, as they answer on the bus: written from their data sheets, apart from the core's decoders,
-//! which are what is tested with them. What no data sheet says is chosen and marked.
+//! The parts of fingers that can be ordered, as they answer on the bus: written from their data sheets, independently
+//! of the core's decoders, which are tested with them. Values that no data sheet gives are chosen and marked.
 
 pub mod ads1220;
 mod bus;
@@ -15,7 +15,7 @@ pub use bus::ClockMode;
 use bus::FLOATING;
 pub use fault::PartFault;
 
-/// What answers on the bus.
+/// The parts that answer on the bus.
 #[allow(clippy::large_enum_variant)]
 pub(super) enum Peers {
     BioTac(SensorPeer),
@@ -46,7 +46,7 @@ impl Peers {
         }
     }
 
-    /// What the parts have to complain of.
+    /// Number of complaints of the parts.
     pub(super) fn complaints(&self) -> u64 {
         match self {
             Self::Mems {
@@ -58,7 +58,7 @@ impl Peers {
         }
     }
 
-    /// Everything is plugged in and whole again; what it was told it may have forgotten.
+    /// Plugs in and repairs everything; parts may have lost their settings.
     pub(super) fn mend(&mut self, now_ns: u64) {
         match self {
             Self::BioTac(sensor) => sensor.plug(now_ns),
@@ -75,7 +75,7 @@ impl Peers {
         }
     }
 
-    /// A tick of the world is over: what goes on without the bus.
+    /// A tick of the world is over: advances the parts that run without the bus.
     pub(super) fn tick(&mut self, now_ns: u64, finger: &Finger) {
         if let (
             Self::Mems {
@@ -112,7 +112,7 @@ impl Peers {
         }
     }
 
-    /// A byte to the selected part, and what it says meanwhile.
+    /// A byte to the selected part; returns the part's byte.
     pub(super) fn byte(&mut self, now_ns: u64, mosi: u8, finger: &mut Finger, fraction: f64) -> u8 {
         match self {
             Self::BioTac(sensor) => {
@@ -158,7 +158,7 @@ impl Peers {
         }
     }
 
-    /// Breaks something; what a finger does not have cannot break.
+    /// Breaks a part; a fault of a part that the finger does not have is ignored.
     pub(super) fn break_part(&mut self, now_ns: u64, fault: PartFault, finger: &mut Finger) {
         match (self, fault) {
             (Self::Analog(converter), PartFault::Unplugged) => converter.unplug(),

@@ -1,5 +1,5 @@
-//! A hand that holds the probe: it presses with about the force that it means to, slides at about the pace that it means
-//! to, and trembles.
+//! A hand that holds the probe: it presses with about the force that it means to, slides at about the pace that it
+//! means to, and trembles.
 //!
 //! The hand feels the force and gives way to it, so that it is a spring and a damper to the finger rather than a place.
 
@@ -16,8 +16,8 @@ use super::surface::LENGTH_MM;
 /// Stream of the seed that hands draw from.
 const STREAM: u64 = 0x4a4d;
 
-/// Force that a hand takes to be moved, N s/mm: with the skin's stiffness of about 1 N/mm it follows what it means within
-/// 0.15 s (chosen).
+/// Force that moves a hand, N s/mm: with the skin's stiffness of about 1 N/mm it follows its intention within 0.15 s
+/// (chosen).
 const DRAG_N_S_MM: f64 = 0.15;
 /// Fastest that it lets the finger down and lifts it, mm/s (chosen).
 const APPROACH_MM_S: f64 = 12.0;
@@ -26,16 +26,17 @@ const LIFT_MM_S: f64 = 60.0;
 const AIR_MM: f64 = 5.0;
 /// A hand comes up to its pace, and stops, within about this, s (chosen).
 const PACE_S: f64 = 0.06;
-/// How slowly force and pace wander, s (chosen: what people do not notice).
+/// Time over which force and pace wander, s (chosen: people do not notice it).
 const WANDER_S: f64 = 0.5;
 /// The pace changes faster: an arm is not a rail (chosen), s.
 const UNEVEN_S: f64 = 0.2;
 /// Physiological tremor, Hz, and its relative bandwidth (8 to 12 Hz in every textbook).
 const TREMOR_HZ: f64 = 10.0;
 const TREMOR_WIDTH: f64 = 0.4;
-/// What only a finger with a mass in it feels: acceleration by tremor, g rms, of a careful hand (Elble and Koller 1990 have some
-/// 0.1 m/s^2 for a stretched hand); by the fingers that rub on the handle while it slides, g rms at 70 mm/s, within a band about this
-/// frequency, Hz (chosen); and how far the handle leans, rad rms, over this time, s (chosen).
+/// Motions that only a finger with a mass in it feels: acceleration by tremor, g rms, of a careful hand (Elble and
+/// Koller 1990 have some 0.1 m/s^2 for a stretched hand); by the fingers that rub on the handle while it slides, g rms
+/// at 70 mm/s, within a band about this frequency, Hz (chosen); and the lean of the handle, rad rms, over this time, s
+/// (chosen).
 const TREMOR_G: f64 = 0.01;
 const RUB_G: f64 = 0.02;
 const RUB_AT_MM_S: f64 = 70.0;
@@ -44,10 +45,10 @@ const LEAN: f64 = 0.2;
 const LEAN_S: f64 = 1.0;
 /// Time that a hand takes to turn the probe over, s (chosen).
 const TURN_S: f64 = 1.0;
-/// Where a touch begins on the sample, mm from its edge.
+/// Range in which a touch begins on the sample, mm from its edge.
 const BEGINS_MM: (f64, f64) = (4.0, 16.0);
 
-/// How well a hand is kept.
+/// The steadiness of a hand.
 #[derive(Clone, Copy, PartialEq, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Manner {
@@ -61,13 +62,14 @@ pub struct Manner {
     pub force_spread: f64,
     /// Deviations of ln(pace) from slide to slide: rms.
     pub pace_spread: f64,
-    /// The probe has a sensor of motion, whose height over the surface is off by so many mm from slide to slide: rms. `None` without
-    /// one.
+    /// The probe has a sensor of motion, whose height over the surface is off by so many mm from slide to slide: rms.
+    /// `None` without one.
     pub tilt_mm: Option<f64>,
 }
 
 impl Default for Manner {
-    /// A careful adult (chosen): force fluctuates by some per cent, a tenth of that at the tremor's frequency and above.
+    /// A careful adult (chosen): force fluctuates by some per cent, a tenth of that at the tremor's frequency and
+    /// above.
     fn default() -> Self {
         Self {
             tremor: 0.005,
@@ -86,7 +88,7 @@ impl Default for Manner {
 pub struct Hand {
     noise: Noise,
     manner: Manner,
-    /// what it means to do
+    /// its intention
     force_n: f64,
     pace_mm_s: f64,
     indentation_mm: f64,
@@ -101,7 +103,7 @@ pub struct Hand {
     shakes: [f64; 2],
     rubs: [f64; 2],
     leans: f64,
-    /// How far it leans, rad: rms.
+    /// Its lean, rad rms.
     lean: f64,
     /// It holds the finger upside down, or means to; how far it is turned, rad.
     over: bool,
@@ -192,7 +194,7 @@ impl Hand {
         }
     }
 
-    /// How the finger is held: what only transducers with a mass feel.
+    /// The hold of the finger: felt only by transducers with a mass.
     pub fn held(&self) -> Held {
         let tremor = TREMOR_G * self.manner.tremor / Manner::default().tremor;
         let rub = RUB_G * self.speed_mm_s.abs() / RUB_AT_MM_S;
@@ -202,7 +204,7 @@ impl Hand {
         }
     }
 
-    /// How deep the sample is in the fingertip, mm; negative is a gap.
+    /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub fn indentation_mm(&self) -> f64 {
         self.indentation_mm
     }

@@ -1,8 +1,8 @@
 //! Recorded slides of a real finger, played where the simulated one slides.
 //!
-//! A recording takes the place of what the simulated texture would do: the vibration that P_AC shows and the tangential
-//! force that the stage has to overcome. How the finger is pressed, and so P_DC, stays the simulated finger's, and so does
-//! everything while it is still.
+//! A recording takes the place of the simulated texture: the vibration that P_AC shows and the tangential force that
+//! the stage has to overcome. The press, and so P_DC, stays the simulated finger's, and so does everything while it is
+//! still.
 
 use super::conditions::{TICK_S, TICKS_PER_S};
 use super::noise::Noise;
@@ -27,14 +27,14 @@ pub struct Played {
     pub shear_mn: Vec<i16>,
 }
 
-/// What has been played.
+/// Counts of the slides and samples played so far.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct PlayCounts {
     /// Slides that were begun.
     pub slides: u32,
-    /// P_AC samples that 12 bits do not hold; they were cut to what they hold.
+    /// P_AC samples beyond 12 bits; they were clipped.
     pub clipped: u32,
-    /// P_AC samples that were asked for after a recording had ended; they show the sensor's noise.
+    /// P_AC samples that were read after a recording had ended; they show the sensor's noise.
     pub over: u32,
 }
 
@@ -93,7 +93,8 @@ impl Playback {
         }
     }
 
-    /// Tangential force now, N; `None` before the movement. Between samples it is interpolated, after the last it stays.
+    /// Tangential force now, N; `None` before the movement. Between samples it is interpolated, after the last it
+    /// stays.
     pub(super) fn shear_n(&self) -> Option<f64> {
         let playing = self.playing.as_ref()?;
         let forces = &self.slides[playing.slide].shear_mn;
@@ -107,8 +108,8 @@ impl Playback {
     /// P_AC `fraction` of a tick after the last but one, counts about the still finger's, where the recording has not
     /// ended; `None` while nothing is played.
     ///
-    /// The first sample of a movement is the recording's first, and later ones are those nearest in time: at the rate of
-    /// the recording, each of its samples once and unaltered.
+    /// The first sample of a movement is the recording's first, and later ones are those nearest in time: at the rate
+    /// of the recording, each of its samples once and unaltered.
     pub(super) fn pac(&mut self, fraction: f64) -> Option<Option<f64>> {
         let playing = self.playing.as_mut().filter(|_| self.moving)?;
         let now = playing.ticks as f64 + fraction;

@@ -1,12 +1,12 @@
-//! How the current of the stage's motor swings within each period of the bridge's PWM: with the PWM high towards where the
-//! supply takes it, with the PWM low towards where the back-EMF does, both with the motor's L/R.
+//! Ripple of the current of the stage's motor within each period of the bridge's PWM: with the PWM high towards the
+//! supply's final value, with the PWM low towards the back-EMF's, both with the motor's L/R.
 //!
 //! ```text
-//! L di/dt = u - R i - K v     u: the supply while PWM is high; while it is low 0 (slow decay), or the supply turned round
-//!                             until i = 0 (fast decay)
+//! L di/dt = u - R i - K v     u: the supply while PWM is high; while it is low 0 (slow decay),
+//!                             or the supply turned round until i = 0 (fast decay)
 //! ```
-//! The mean over a period moves the stage, and is [`Stage::current_a`](super::stage::Stage::current_a). A converter reads the
-//! current of an instant.
+//! The mean over a period moves the stage, and is [`Stage::current_a`](super::stage::Stage::current_a). A converter
+//! reads the current of an instant.
 
 use super::maths::{exp, ln};
 
@@ -19,14 +19,14 @@ pub struct PwmPhase {
     pub since_s: f64,
 }
 
-/// Where the current of a driven motor goes to, A.
+/// Final values of the current of a driven motor, A.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ends {
     /// With the PWM high.
     pub(super) high_a: f64,
     /// With the PWM low.
     pub(super) low_a: f64,
-    /// Whether it stops at 0 on the way to that.
+    /// True if it stops at 0 on the way to that.
     pub(super) stops: bool,
     /// The motor's L/R, s.
     pub(super) time_constant_s: f64,
@@ -90,8 +90,8 @@ mod tests {
         above_mean_a(ends, duty, phase)
     }
 
-    /// The motor's equation by small steps, from no current until nothing changes from period to period: the currents of the
-    /// last period.
+    /// The motor's equation by small steps, from no current until nothing changes from period to period: the currents
+    /// of the last period.
     fn by_steps(ends: Ends, duty: f64) -> Vec<f64> {
         const STEPS: usize = 5000;
         let mut current = 0.0;

@@ -1,7 +1,7 @@
-//! The BioTac's protocol as the sensor plays it: what it answers at each chip select.
+//! The sensor's side of the BioTac's protocol: its answer at each chip select.
 //!
-//! Its words are made here, apart from the core's, which are what is tested with them. [`sim`](super) names the documents;
-//! what none of them says is chosen and marked.
+//! Its words are made here, independently of the core's, which are tested with them. [`sim`](super) names the
+//! documents; values that none of them gives are chosen and marked.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ const NOTHING_TO_SEND: u8 = 0x5F;
 const PROPERTY: u8 = 0x61;
 /// Command that starts the streaming mode.
 const STREAM: u8 = 0xA1;
-/// MISO with nobody driving it.
+/// MISO while no part drives it.
 const FLOATING: u8 = 0xFF;
 
 /// Longest property, bytes: the serial number.
@@ -44,7 +44,7 @@ const SLOW_NOISE: f64 = 1.0;
 /// Electrodes change with the force on the finger, counts/N (chosen).
 const ELECTRODE_PER_N: f64 = -150.0;
 
-/// What the sensor has to say at the next select.
+/// The sensor's answer at the next select.
 #[derive(Clone, Copy)]
 enum Reply {
     Word([u8; 2]),
@@ -63,7 +63,7 @@ pub struct SensorPeer {
     ended_ns: u64,
     streaming: bool,
     flip: u16,
-    /// of this select: whether the sensor heard it, after how long, the bytes so far, what it says
+    /// of this select: whether the sensor heard it, after how long, the bytes so far, the answer
     on: bool,
     quiet_ns: u64,
     bytes: usize,
@@ -104,12 +104,12 @@ impl SensorPeer {
         &self.complaints
     }
 
-    /// Whether it is in its streaming mode, and answers nothing.
+    /// Returns true if it is in its streaming mode, and answers nothing.
     pub fn is_streaming(&self) -> bool {
         self.streaming
     }
 
-    /// Whether it has power.
+    /// Returns true if it has power.
     pub fn is_plugged(&self) -> bool {
         self.powered_ns.is_some()
     }
@@ -136,7 +136,8 @@ impl SensorPeer {
 
     /// Chip select falls. A sample is taken at the command, and read at the next select.
     ///
-    /// A command while an answer waits starts anew (chosen: a host that restarts between the two is then in step again).
+    /// A command while an answer waits starts anew (chosen: a host that restarts between the two is then in step
+    /// again).
     pub fn select(&mut self, now_ns: u64) {
         self.quiet_ns = now_ns.saturating_sub(self.ended_ns);
         self.on = self
@@ -146,8 +147,8 @@ impl SensorPeer {
         self.line = [FLOATING; PROPERTY_LEN];
     }
 
-    /// Takes a byte. The first one decides what is on the line: [`SensorPeer::line`]. The sample of a command is taken
-    /// `fraction` of a tick after the last but one.
+    /// Takes a byte. The first one sets the answer: [`SensorPeer::line`]. The sample of a command is taken `fraction`
+    /// of a tick after the last but one.
     pub fn byte(&mut self, mosi: u8, finger: &mut Finger, fraction: f64) {
         self.bytes += 1;
         match self.bytes {
@@ -157,7 +158,7 @@ impl SensorPeer {
         }
     }
 
-    /// What the sensor says in this period of chip select, byte by byte; later ones float.
+    /// The sensor's bytes in this period of chip select; later ones float.
     pub fn line(&mut self) -> &mut [u8; PROPERTY_LEN] {
         &mut self.line
     }
@@ -170,7 +171,7 @@ impl SensorPeer {
         self.ended_ns = now_ns;
     }
 
-    /// One period of chip select as a whole, from `now_ns` on: what comes of `mosi`, and `miso` in answer.
+    /// One period of chip select as a whole, from `now_ns` on: sends `mosi`, and fills `miso` with the answer.
     pub fn transfer(
         &mut self,
         now_ns: u64,
@@ -290,7 +291,7 @@ impl SensorPeer {
     }
 }
 
-/// Whether a first byte starts something: a command of right parity that samples or reads a property.
+/// Returns true if a first byte starts something: a command of right parity that samples or reads a property.
 fn is_command(byte: u8) -> bool {
     (byte >= 0x80 || byte == PROPERTY) && !byte.count_ones().is_multiple_of(2)
 }

@@ -20,7 +20,7 @@ pub struct Transfer {
     pub part: u8,
     /// See [`Transfer::part`].
     pub mode: ClockMode,
-    /// When it falls, and how long it stays low, ns.
+    /// Its falling edge, and the time that it stays low, ns.
     pub begins_ns: u64,
     /// See [`Transfer::begins_ns`].
     pub takes_ns: u64,
@@ -68,7 +68,7 @@ impl Reader {
         Some(parts as f32 / GRAVITY_PARTS)
     }
 
-    /// How a transaction is made that begins at this time, ns.
+    /// The transfer of a transaction that begins at this time, ns.
     pub fn transfer(&self, transaction: &Transaction, begins_ns: u64) -> Transfer {
         let port = self.ports().get(usize::from(transaction.port));
         Transfer {
@@ -79,7 +79,8 @@ impl Reader {
         }
     }
 
-    /// The word of slot `n`, which begins at `at_ns`. `transact` gets each of its transfers, what is sent, and room for what comes in.
+    /// The word of slot `n`, which begins at `at_ns`. `transact` gets each of its transfers, the bytes to send, and a
+    /// buffer for the answer.
     pub fn word_of_slot(
         &mut self,
         n: u64,

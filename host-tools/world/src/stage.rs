@@ -2,16 +2,16 @@
 //! quadrature encoder, two limit switches and a current amplifier.
 //!
 //! The paper's stage (ANT130, Aerotech) is a linear motor whose controller tells its current; ours is the one of the
-//! list of parts (docs/src/rig.md). Its current is that of the unloaded stage plus the shear force over [`FORCE_N_PER_A`], as the paper
-//! found by weights on the inclined stage.
+//! list of parts (docs/src/rig.md). Its current is that of the unloaded stage plus the shear force over
+//! [`FORCE_N_PER_A`], as the paper found by weights on the inclined stage.
 //!
 //! ```text
 //! mass dv/dt = K i + shear - friction(x, v)      K = 2 pi Kt / lead, in N/A and in V s/m
 //! R i        = duty x supply - K v               (L/R is 35 us, less than a tick)
 //! ```
-//! The two are solved together for the speed at the end of the tick, so that a steady speed is exact. That is a bridge which
-//! shorts the motor while its PWM is low (*slow decay*), as the parts list wants it. One that is off meanwhile (*fast decay*)
-//! lets the current run back into the supply and then stop: [`Stage::decay_fast`].
+//! The two are solved together for the speed at the end of the tick, so that a steady speed is exact. That is a bridge
+//! which shorts the motor while its PWM is low (*slow decay*), as the parts list wants it. One that is off meanwhile
+//! (*fast decay*) lets the current run back into the supply and then stop: [`Stage::decay_fast`].
 
 use std::f64::consts::TAU;
 
@@ -22,8 +22,8 @@ use super::ripple::{self, PwmPhase};
 
 /// Supply of the H-bridge, V (chosen).
 pub const SUPPLY_V: f64 = 12.0;
-/// Motor, leads, shunt and bridge, ohm (chosen, like a 24 V motor of 23 mm: 7.1 ohm and 26.1 mNm/A), so that a jammed stage
-/// draws 1.6 A, which the amplifier still measures.
+/// Motor, leads, shunt and bridge, ohm (chosen, like a 24 V motor of 23 mm: 7.1 ohm and 26.1 mNm/A), so that a jammed
+/// stage draws 1.6 A, which the amplifier still measures.
 pub const RESISTANCE_OHM: f64 = 7.5;
 /// Torque per current, Nm/A (chosen, see above).
 pub const TORQUE_NM_PER_A: f64 = 0.0261;
@@ -45,7 +45,7 @@ pub const BREAKAWAY: f64 = 1.2;
 pub const STRIBECK_MM_S: f64 = 1.0;
 /// Viscous friction, N s/m (chosen): 0.2 N at 100 mm/s.
 pub const VISCOUS_N_S_PER_M: f64 = 2.0;
-/// How the Coulomb friction differs over the travel: share, and wavelength in mm (chosen): once per revolution of the
+/// Variation of the Coulomb friction over the travel: share, and wavelength in mm (chosen): once per revolution of the
 /// screw, and over its length.
 pub const FRICTION_WAVES: [(f64, f64); 2] = [(0.02, LEAD_MM), (0.02, 63.0)];
 /// Standard deviation of the Coulomb friction from trial to trial, share (chosen).
@@ -55,15 +55,15 @@ pub const RIPPLE: f64 = 0.02;
 /// ... this often per revolution, by commutation (5 segments).
 pub const RIPPLES_PER_TURN: f64 = 10.0;
 
-/// A stage that vibrates lifts and lowers the sample so often per revolution of the screw, with these shares of the amplitude
-/// (chosen): the screw's runout, the commutation (100 Hz at 100 mm/s), the nut's thread.
+/// A stage that vibrates lifts and lowers the sample so often per revolution of the screw, with these shares of the
+/// amplitude (chosen): the screw's runout, the commutation (100 Hz at 100 mm/s), the nut's thread.
 pub const VIBRATIONS: [(f64, f64); 3] = [(1.0, 1.0), (RIPPLES_PER_TURN, 0.3), (32.0, 0.1)];
 /// Speed at which [`Stage::vibrate`] gives the amplitude, mm/s; at others it is in proportion.
 pub const VIBRATION_MM_S: f64 = 100.0;
 
 /// Way between the hard stops, mm (chosen). Positions count from the lower one.
 pub const TRAVEL_MM: f64 = 85.0;
-/// Where the sample of [`SAMPLE_MM`] begins: in the middle of the travel.
+/// Place where the sample of [`SAMPLE_MM`] begins: in the middle of the travel.
 pub const SAMPLE_AT_MM: f64 = 5.0;
 /// Length of a sample (paper, Textures).
 pub const SAMPLE_MM: f64 = 75.0;
@@ -119,7 +119,8 @@ pub struct Stage {
     along: Along,
 }
 
-/// What depends on the position alone: sines, which take longer than the rest of a tick, and the stage often stands.
+/// Values that depend on the position alone: sines, which take longer than the rest of a tick, and the stage often
+/// stands.
 #[derive(Clone, Copy, Default, Debug)]
 struct Along {
     force_n_per_a: f64,
@@ -128,8 +129,8 @@ struct Along {
 }
 
 impl Stage {
-    /// A stage that stands at `position_mm`. What differs between stages is drawn from `world_seed`, what differs between
-    /// trials from `trial_seed`.
+    /// A stage that stands at `position_mm`. What differs between stages is drawn from `world_seed`, what differs
+    /// between trials from `trial_seed`.
     pub fn new(position_mm: f64, world_seed: u64, trial_seed: u64) -> Self {
         let mut stage = Noise::new(world_seed, STREAM);
         let mut trial = Noise::new(trial_seed, STREAM);
@@ -175,7 +176,7 @@ impl Stage {
         self.enabled = on;
     }
 
-    /// Whether something holds the stage (fault).
+    /// Holds the stage, or lets it go (fault).
     pub fn jam(&mut self, jammed: bool) {
         self.jammed = jammed;
     }
@@ -209,7 +210,8 @@ impl Stage {
         self.switch_limits();
     }
 
-    /// Mean current over a period of the PWM, A: driven by the supply, then against it through the diodes until there is none.
+    /// Mean current over a period of the PWM, A: driven by the supply, then against it through the diodes until there
+    /// is none.
     fn fast_current_a(&self) -> f64 {
         let emf_v = self.along.force_n_per_a * self.speed_mm_s * 1e-3 * self.duty.signum();
         let on_s = self.duty.abs() * PWM_S;
@@ -267,7 +269,7 @@ impl Stage {
         let drag = force_n_per_a * force_n_per_a * braking + VISCOUS_N_S_PER_M;
         let inertia = MASS_KG / TICK_S + drag;
         let free = (MASS_KG / TICK_S * v + push_n) / inertia;
-        // ... which then takes what it can, but turns nothing round
+        // ... which then takes its share, but reverses no motion
         let dry = self.dry_friction_n() / inertia;
         let after = if self.jammed || free.abs() <= dry {
             0.0
@@ -289,13 +291,13 @@ impl Stage {
         self.switch_limits();
     }
 
-    /// From now on it vibrates while it moves: amplitude of the sample's way up and down at [`VIBRATION_MM_S`], um. The paper's
-    /// stage does not.
+    /// From now on it vibrates while it moves: amplitude of the sample's way up and down at [`VIBRATION_MM_S`], um. The
+    /// paper's stage does not.
     pub fn vibrate(&mut self, um: f64) {
         self.vibration_um = um;
     }
 
-    /// How much higher the sample is than on a stage that does not vibrate, mm.
+    /// Height of the sample above its place on a stage that does not vibrate, mm.
     pub fn heave_mm(&self) -> f64 {
         let amplitude_um = self.vibration_um * self.speed_mm_s.abs() / VIBRATION_MM_S;
         if amplitude_um == 0.0 {
@@ -318,8 +320,8 @@ impl Stage {
         self.position_before_mm + (self.position_mm - self.position_before_mm) * fraction
     }
 
-    /// Where on the sample the finger is, mm from its edge. The last point of a sample goes on to the hard stop: a finger
-    /// never falls off the edge.
+    /// Place of the finger on the sample, mm from its edge. The last point of a sample continues to the hard stop: a
+    /// finger never falls off the edge.
     pub fn on_sample_mm(&self) -> f64 {
         (self.position_mm - SAMPLE_AT_MM).clamp(0.0, SAMPLE_MM)
     }
@@ -344,12 +346,12 @@ impl Stage {
         self.held = (lower, upper);
     }
 
-    /// What the converter reads of the mean current at a time: two readings at the same time are the same.
+    /// Reading of the converter for the mean current at a time: two readings at the same time are the same.
     pub fn adc(&self, now_ns: u64) -> u16 {
         self.reading(self.current_a, now_ns)
     }
 
-    /// What it reads of the current at this place in a period of the bridge's PWM.
+    /// Reading of the converter at this place in a period of the bridge's PWM.
     pub fn adc_within(&self, now_ns: u64, phase: PwmPhase) -> u16 {
         self.reading(self.current_a + self.ripple_a(phase), now_ns)
     }

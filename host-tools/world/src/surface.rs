@@ -12,7 +12,7 @@ pub const LENGTH_MM: f64 = 75.0;
 pub const POINT_MM: f64 = 0.005;
 /// Points of the profile: a power of two that covers the sample and half a contact patch at either end.
 const POINTS: usize = 1 << 14;
-/// Where the profile starts, mm: it covers -3.46 .. 78.46 mm.
+/// Beginning of the profile, mm: it covers -3.46 .. 78.46 mm.
 const START_MM: f64 = (LENGTH_MM - POINTS as f64 * POINT_MM) / 2.0;
 
 /// Shortest wavelength that the silicone of the skin follows into the valleys, mm (chosen: a quarter of a ridge).
@@ -26,15 +26,15 @@ const SLOW_POINTS: usize = 83;
 /// Distance of those points, mm.
 const SLOW_MM: f64 = 1.0;
 
-/// Load and speed at which a texture's friction is quoted, N and mm/s (chosen: the force that suits traction best in the
-/// paper, and the middle of its speeds).
+/// Load and speed at which a texture's friction is quoted, N and mm/s (chosen: the force that suits traction best in
+/// the paper, and the middle of its speeds).
 pub const FRICTION_AT: (f64, f64) = (1.26, 25.1);
 /// Load and speed at which its vibrations are, N and mm/s (chosen: the paper's movement between the others).
 pub const VIBRATIONS_AT: (f64, f64) = (0.5, 25.1);
 /// Lowest load and speed of the laws of both, N and mm/s (chosen: below them they stay as they are there).
 const LAWS_FROM: (f64, f64) = (0.05, 5.0);
-/// How far from where they are quoted the laws bend, in ln(speed) (chosen: about over the speeds of the paper's three
-/// movements).
+/// Distance from the quoted point at which the laws bend, in ln(speed) (chosen: about over the speeds of the paper's
+/// three movements).
 const BENDS: f64 = 1.0;
 
 impl Texture {
@@ -56,8 +56,8 @@ impl Texture {
         exp(bent(self.vibration_speed, self.vibration_bend, speed))
     }
 
-    /// What of the vibrations passes under a load, the skin being clamped the more it is pressed: at [`VIBRATIONS_AT`] all
-    /// textures' alike.
+    /// Share of the vibrations that passes under a load, the skin being clamped the more it is pressed: at
+    /// [`VIBRATIONS_AT`] all textures' alike.
     pub(super) fn passed(&self, load_n: f64) -> f64 {
         let of = |clamped_n: f64, load_n: f64| 1.0 / (1.0 + load_n / clamped_n);
         let here = of(self.clamped_n, load_n) / of(self.clamped_n, VIBRATIONS_AT.0);
@@ -91,9 +91,9 @@ pub struct Surface {
     texture: Texture,
     /// heights, um
     height: Vec<f32>,
-    /// what of them the skin follows, um: looked up all the time, so that its length is known while compiling
+    /// the part of them that the skin follows, um: looked up all the time, so that its length is known while compiling
     followed: Box<[f32; POINTS]>,
-    /// rms of what it does not follow, um
+    /// rms of the part that it does not follow, um
     unresolved_um: f64,
     /// friction relative to the texture's, every [`SLOW_MM`]
     friction: Vec<f64>,
@@ -156,7 +156,8 @@ impl Surface {
         a + (b - a) * rest
     }
 
-    /// Coefficient of kinetic friction of the skin at `x_mm`, sliding at `speed_mm_s` under `load_n`: a power law of both.
+    /// Coefficient of kinetic friction of the skin at `x_mm`, sliding at `speed_mm_s` under `load_n`: a power law of
+    /// both.
     pub fn friction(&self, x_mm: f64, speed_mm_s: f64, load_n: f64) -> f64 {
         self.texture.friction * slow(&self.friction, x_mm) * self.texture.law(speed_mm_s, load_n)
     }
@@ -176,9 +177,9 @@ impl Surface {
         self.unresolved_um
     }
 
-    /// Mean height, um, that the skin follows about `x_mm`, with the pressure of a Hertz contact `half_mm` to either side
-    /// (at most 3.4), taken at points `pitch_mm` (a multiple of [`POINT_MM`]) apart of which every second, the first at
-    /// `x_mm`, carries 1 + `contrast` and the others 1 - `contrast`.
+    /// Mean height, um, that the skin follows about `x_mm`, with the pressure of a Hertz contact `half_mm` to either
+    /// side (at most 3.4), taken at points `pitch_mm` (a multiple of [`POINT_MM`]) apart of which every second, the
+    /// first at `x_mm`, carries 1 + `contrast` and the others 1 - `contrast`.
     pub(super) fn contact_um(&self, x_mm: f64, half_mm: f64, pitch_mm: f64, contrast: f64) -> f64 {
         let (i, rest) = place(x_mm);
         let stride = (pitch_mm / POINT_MM).round() as usize;
@@ -232,7 +233,8 @@ fn wandering(noise: &mut Noise, deviation: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A random profile with the given relative power density over spatial frequency, told by its wavelength in mm.
+/// A random profile with the given relative power density over spatial frequency, as a function of the wavelength in
+/// mm.
 fn random_profile(noise: &mut Noise, density: impl Fn(f64) -> f64) -> Vec<f64> {
     let length_mm = POINTS as f64 * POINT_MM;
     let (mut re, mut im) = (vec![0.0; POINTS], vec![0.0; POINTS]);
@@ -278,7 +280,7 @@ fn add_weave(profile: &mut [f64], texture: &Texture, noise: &mut Noise) {
     }
 }
 
-/// What is left of a profile when wavelengths below `shortest_mm` are lost: two running means of half of it.
+/// The rest of a profile without wavelengths below `shortest_mm`: two running means of half of it.
 fn smooth(profile: &[f32], shortest_mm: f64) -> Vec<f32> {
     let half = (shortest_mm / 4.0 / POINT_MM).round() as usize;
     let n = profile.len();

@@ -1,8 +1,8 @@
-//! What the 117 textures of the paper's Table 1 are like: physical parameters, drawn from their group's distribution.
+//! The 117 textures of the paper's Table 1: physical parameters, drawn from their group's distribution.
 //!
-//! The medians are chosen, each from what such a material is like (yarn counts of cloth, grain of wood, finish of metal)
-//! and from what the paper says of it by name (Table 2 and Results). What the paper measured of them is in no table, so a
-//! world is one of many possible collections of 117 such textures.
+//! The medians are chosen, each from such materials' figures (yarn counts of cloth, grain of wood, finish of metal) and
+//! from the paper's remarks about it by name (Table 2 and Results). The paper's measurements of them are in no table,
+//! so a world is one of many possible collections of 117 such textures.
 
 mod names;
 mod recipes;
@@ -23,7 +23,7 @@ pub struct Weave {
     pub rms_um: f64,
     /// Relative deviation of one period from the next.
     pub jitter: f64,
-    /// How many harmonics it has.
+    /// Number of its harmonics.
     pub harmonics: u32,
     /// Their amplitudes fall as 1/k to this power.
     pub falloff: f64,
@@ -68,7 +68,7 @@ pub struct Texture {
     pub relief_exponent: f64,
     /// The periodic part, if it has one.
     pub weave: Option<Weave>,
-    /// How much of the vibrations the material swallows, 0..1.
+    /// Share of the vibrations that the material swallows, 0..1.
     pub damping: f64,
     /// Vibrations fall as 1 / (1 + F / this), N: soon where the skin is soon clamped, later where it sinks in.
     pub clamped_n: f64,
@@ -80,13 +80,13 @@ pub struct Texture {
     pub heterogeneity: f64,
     /// Thickness, mm; at most `FITS_MM`.
     pub thickness_mm: f64,
-    /// How much it gives way under the finger, mm/N.
+    /// Compliance under the finger, mm/N.
     pub compliance_mm_per_n: f64,
 }
 
 impl Texture {
-    /// Relative power density of the relief at a wavelength in mm: 1/f^a at short wavelengths, flat about `relief_mm`, and
-    /// nothing much at [`LONGEST`] times that and more: samples lie flat on their magnets.
+    /// Relative power density of the relief at a wavelength in mm: 1/f^a at short wavelengths, flat about `relief_mm`,
+    /// and nothing much at [`LONGEST`] times that and more: samples lie flat on their magnets.
     pub(super) fn relief(&self, wavelength_mm: f64) -> f64 {
         let short = pow(self.relief_mm / wavelength_mm, self.relief_exponent);
         let long = square(square(wavelength_mm / (LONGEST * self.relief_mm)));
@@ -113,7 +113,7 @@ const GROUP_SPREAD: Spread = Spread {
     wavelength: 0.25,
     movement: 1.0,
 };
-/// Of a texture of which the paper or its name says more (chosen).
+/// Deviations of a texture about which the paper or its name tells more (chosen).
 const HINTED_SPREAD: Spread = Spread {
     friction: 0.08,
     height: 0.15,
@@ -121,25 +121,26 @@ const HINTED_SPREAD: Spread = Spread {
     movement: 0.6,
 };
 /// Deviation of the powers with which friction goes with load and with speed, and of the curvature of ln(friction) over
-/// ln(speed): an elastomer's friction on a dry surface rises or falls towards a peak at a speed of that surface (chosen).
+/// ln(speed): an elastomer's friction on a dry surface rises or falls towards a peak at a speed of that surface
+/// (chosen).
 const FRICTION_POWERS: (f64, f64, f64) = (0.15, 0.18, 0.12);
-/// Friction goes with the heights of a texture, relative to its kind's, to this power (chosen; PAPER Table 3: the rougher,
-/// the less traction).
+/// Friction goes with the heights of a texture, relative to its kind's, to this power (chosen; PAPER Table 3: the
+/// rougher, the less traction).
 const SMOOTHER: f64 = -0.4;
-/// Load at which the vibrations of an ordinary texture have fallen to half, N (chosen; PAPER: "greater forces tend to dampen
-/// vibrations"), and the deviation of its ln among textures.
+/// Load at which the vibrations of an ordinary texture have fallen to half, N (chosen; PAPER: "greater forces tend to
+/// dampen vibrations"), and the deviation of its ln among textures.
 pub(super) const CLAMPED_N: (f64, f64) = (0.6, 0.5);
-/// Deviation of the power with which vibrations go with speed, and of how that power changes with ln(speed): what catches
-/// at one speed is skipped at another (chosen).
+/// Deviation of the power with which vibrations go with speed, and of how that power changes with ln(speed): what
+/// catches at one speed is skipped at another (chosen).
 const VIBRATION_SPEED: (f64, f64) = (0.45, 0.2);
 /// Deviation of ln(centre of the impulses' spectrum) (chosen).
 const IMPULSE_SPREAD: f64 = 0.3;
-/// Deviation of the power with which that centre goes with load, and of its bend over speed (chosen; PAPER: by and large
-/// it does not scale with speed).
+/// Deviation of the power with which that centre goes with load, and of its bend over speed (chosen; PAPER: by and
+/// large it does not scale with speed).
 const IMPULSE_POWERS: (f64, f64) = (0.25, 0.15);
 /// Deviation of a period from the next in cloth (chosen).
 const CLOTH_JITTER: f64 = 0.03;
-/// The same in what is moulded, machined or extruded (chosen).
+/// The same in moulded, machined or extruded textures (chosen).
 const GRATING_JITTER: f64 = 0.001;
 
 /// Draws the parameters of texture `number` in the world `seed`.

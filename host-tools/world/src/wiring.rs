@@ -1,10 +1,11 @@
-//! Wires that do not lead where they should, and parts that are others than in the list: what a rig may have on its first
-//! evening. What breaks later is a [`Fault`](super::faults::Fault).
+//! Wires that do not lead where they should, and parts that are others than in the list: what a rig may have on its
+//! first evening. What breaks later is a [`Fault`](super::faults::Fault).
 
-/// A mistake of whoever built the rig. Each shows only at the pins.
+/// A mistake in building the rig. Each shows only at the pins.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Miswired {
-    /// The sensor's MISO and MOSI are exchanged: it hears no command, and drives the chip's MOSI while it is selected.
+    /// The sensor's MISO and MOSI are exchanged: it receives no command, and drives the chip's MOSI while it is
+    /// selected.
     DataExchanged,
     /// The sensor's chip select leads nowhere: it is never selected.
     SelectOpen,
@@ -23,7 +24,7 @@ pub enum Miswired {
     EStopKeepsSupply,
     /// The stage's motor is connected the other way round.
     MotorReversed,
-    /// PWM and DIR of the stage's bridge are exchanged: DIR switches it, and PWM says which way.
+    /// PWM and DIR of the stage's bridge are exchanged: DIR switches it, and PWM sets the direction.
     PwmDirExchanged,
     /// The enable of the stage's bridge leads nowhere: the bridge is off.
     BridgeEnableOpen,
@@ -39,12 +40,12 @@ pub enum Miswired {
     EncoderLines(f64),
 }
 
-/// What a floating input of the converter reads, counts.
+/// Reading of a floating input of the converter, counts.
 const FLOATING_COUNTS: f64 = 372.0;
-/// What the converter reads without current.
+/// Reading of the converter without current, counts.
 const MIDDLE_COUNTS: f64 = 2048.0;
 
-/// How the wires of a rig lead, as far as they are not the lever's or the encoder's own.
+/// The wires of a rig, without those of the lever and the encoder.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wires {
     pub(super) data_exchanged: bool,
@@ -80,7 +81,7 @@ impl Default for Wires {
 }
 
 impl Wires {
-    /// Whether the sensor hears the chip.
+    /// Returns true if the sensor hears the chip.
     pub(super) fn reach_sensor(&self) -> bool {
         !self.data_exchanged && !self.select_open
     }
@@ -107,7 +108,7 @@ impl Wires {
         }
     }
 
-    /// What the motor gets of that.
+    /// The motor's share of that.
     pub(super) fn motor_duty(&self, duty: f64) -> f64 {
         match self.motor_reversed {
             true => -duty,
@@ -115,7 +116,7 @@ impl Wires {
         }
     }
 
-    /// What the converter reads where the book's wires would have it read `reading`.
+    /// Reading of the converter where the book's wires would give `reading`.
     pub(super) fn amplified(&self, reading: u16) -> u16 {
         if self.current_open {
             return FLOATING_COUNTS as u16;

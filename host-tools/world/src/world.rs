@@ -1,12 +1,12 @@
 //! The whole rig behind its pins: finger, sample, lever, stage, encoder, amplifier, switches.
 //!
-//! Inputs are levels, duties and bytes with their time in ns; outputs are what the pins say at the time reached. Nothing
-//! here knows what a controller means to do. [`World::truth`] is for tests and displays only.
+//! Inputs are levels, duties and bytes with their time in ns; outputs are the levels of the pins at the time reached.
+//! Nothing here knows the intentions of a controller. [`World::truth`] is for tests and displays only.
 //!
-//! Time: [`World::advance_to`] goes on in ticks of 76 us ([`TICKS_PER_S`](super::TICKS_PER_S)). The tick that holds the
-//! time reached is computed as a whole, with the inputs as they were at its begin, so that an input acts within 76 us;
-//! outputs between ticks are interpolated. Times may repeat; a time earlier than the last acts now, though the driver still
-//! measures STEP and DIR by it.
+//! Time: [`World::advance_to`] advances in ticks of 76 us ([`TICKS_PER_S`](super::TICKS_PER_S)). The tick that holds
+//! the time reached is computed as a whole, with the inputs as they were at its begin, so that an input acts within
+//! 76 us; outputs between ticks are interpolated. Times may repeat; a time earlier than the last acts now, though the
+//! driver still measures STEP and DIR by it.
 //!
 //! A world is its [`Setup`] and its inputs: the same give the same words, on any thread.
 
@@ -33,25 +33,27 @@ mod holder;
 pub use built::Reached;
 use holder::Holder;
 
-/// What a world is made from.
+/// The seeds and parts that a world is made from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Setup {
     /// Number of the texture that is mounted, 1 to 117 (Table 1).
     pub texture: u8,
-    /// What the textures, this rig's motors and its amplifier are like.
+    /// Seed of the textures, this rig's motors and its amplifier.
     pub world_seed: u64,
-    /// What differs between trials: where lever and stage stand at power-up, noise, hum, the stage's friction.
+    /// Seed of the differences between trials: the places of lever and stage at power-up, noise, hum, the stage's
+    /// friction.
     pub trial_seed: u64,
-    /// Which fingertip it is.
+    /// Seed of the fingertip.
     pub finger_seed: u64,
-    /// Which kind of finger it is.
+    /// Kind of finger.
     pub finger: FingerName,
-    /// Whether [`World::next_encoder_edge`] is going to be asked: edges are kept until then.
+    /// True if [`World::next_encoder_edge`] is going to be asked: edges are kept until then.
     pub keep_edges: bool,
-    /// Whether samples lie on shims: those that are thinner than [`World::SHIMMED_MM`] end at that height. The finger's way
-    /// down, at 0.5 mm/s, then takes 9 s at most and not up to half a minute.
+    /// True if samples lie on shims: those that are thinner than [`World::SHIMMED_MM`] end at that height. The finger's
+    /// way down, at 0.5 mm/s, then takes 9 s at most and not up to half a minute.
     pub shimmed: bool,
-    /// Of which world the texture is; this one's, unless given. So one rig slides over more textures than Table 1 has.
+    /// The world that the texture belongs to; this one, unless given. So one rig slides over more textures than Table
+    /// 1 has.
     pub samples_of: Option<u64>,
 }
 
@@ -70,7 +72,7 @@ impl Default for Setup {
     }
 }
 
-/// What is really so, as no pin tells it.
+/// The ground truth, which no pin shows.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Truth {
     /// Time of these values: the end of the tick, at most 76 us ahead of the time reached.
@@ -85,9 +87,9 @@ pub struct Truth {
     pub shear_n: f64,
     /// Height of the undeformed fingertip over the steel plate, mm.
     pub tip_mm: f64,
-    /// How deep the sample pushes into the fingertip, mm; negative is a gap.
+    /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub indentation_mm: f64,
-    /// Steps down that STEP asked for and the lever did not make, less those up.
+    /// Steps down that STEP commanded and the lever did not make, less those up.
     pub lever_missing_steps: f64,
     /// STEP and DIR edges that broke the driver's timing.
     pub lever_bad_pulses: u64,
@@ -101,19 +103,19 @@ pub struct Truth {
     pub speed_mm_s: f64,
     /// Motor current, A.
     pub current_a: f64,
-    /// How far the finger's mount has yielded, mm.
+    /// Yield of the finger's mount, mm.
     pub mount_mm: f64,
-    /// Work that the finger's shear took since power-up, J: what wears the skin.
+    /// Work of the finger's shear since power-up, J: it wears the skin.
     pub sliding_j: f64,
     /// Wear of the skin, as the finger has it.
     pub wear: f64,
 }
 
-/// Why a hand cannot get between finger and sample, or another sample cannot.
+/// The reason why a hand cannot get between finger and sample, or another sample cannot.
 #[derive(thiserror::Error, Clone, Copy, PartialEq, Debug)]
 #[error("the finger would be {indentation_mm:.3} mm deep in the sample: lift it first")]
 pub struct NotLifted {
-    /// How deep, mm.
+    /// Depth of the sample in the fingertip, mm.
     pub indentation_mm: f64,
 }
 
@@ -153,10 +155,11 @@ pub struct World {
 }
 
 impl World {
-    /// Where the tip may be at power-up, mm over the plate, and the stage, mm (chosen): a controller has to find its
+    /// Range of the tip at power-up, mm over the plate, and of the stage, mm (chosen): a controller has to find its
     /// switches.
     const POWER_UP_MM: [(f64, f64); 2] = [(12.0, 15.0), (20.0, 65.0)];
-    /// Where shims bring a sample that is thinner, mm over the plate: a millimetre below the lowest tip at power-up.
+    /// Height to which shims bring a sample that is thinner, mm over the plate: a millimetre below the lowest tip at
+    /// power-up.
     pub const SHIMMED_MM: f64 = 11.0;
 
     /// A rig just powered up: no current in either motor, the finger in the air.
@@ -264,7 +267,7 @@ impl World {
         self.supply_motors();
     }
 
-    /// Gives both motors current as their enables say, unless the emergency stop has taken their supply.
+    /// Gives both motors current if they are enabled, unless the emergency stop has taken their supply.
     fn supply_motors(&mut self) {
         let dips = self.now_ns < self.faults.dip_ends_ns;
         let stopped = self.faults.e_stop.cuts_power() && !self.wires.stop_keeps_supply;
@@ -281,13 +284,14 @@ impl World {
             .count(self.stage.position_at_mm(self.fraction()))
     }
 
-    /// The next edge of the encoder's lines up to the time reached, if [`Setup::keep_edges`] is set. Both lines are low at
-    /// power-up.
+    /// The next edge of the encoder's lines up to the time reached, if [`Setup::keep_edges`] is set. Both lines are low
+    /// at power-up.
     pub fn next_encoder_edge(&mut self) -> Option<Edge> {
         self.encoder.next_edge(self.now_ns)
     }
 
-    /// The converter's reading of the stage's mean motor current: 12 bits over 3.3 V, about 2048 without current, 1 V/A.
+    /// The converter's reading of the stage's mean motor current: 12 bits over 3.3 V, about 2048 without current, 1
+    /// V/A.
     pub fn motor_adc(&self) -> u16 {
         self.amplified(self.stage.adc(self.now_ns))
     }
@@ -327,7 +331,7 @@ impl World {
         self.faults.e_stop.is_open(self.now_ns) && !self.wires.stop_bridged
     }
 
-    /// What is really so.
+    /// The ground truth.
     pub fn truth(&self) -> Truth {
         let holder = self.holder.as_ref();
         Truth {
@@ -462,7 +466,8 @@ impl World {
         self.sliding_j -= shear_n * (to_mm - from_mm) * 1e-3;
     }
 
-    /// A tick of lever and stage with this force of the finger and this shear on them, N: from where to where the stage goes.
+    /// A tick of lever and stage with this force of the finger and this shear on them, N: from where to where the stage
+    /// goes.
     fn move_motors(&mut self, force_n: f64, shear_n: f64) -> [f64; 2] {
         self.lever.tick(self.tick_ends_ns, force_n);
         let from_mm = self.stage.position_mm();
@@ -477,7 +482,7 @@ impl World {
         [from_mm, to_mm]
     }
 
-    /// How far the time reached is into its tick, 0 to 1.
+    /// Part of its tick at the time reached, 0 to 1.
     fn fraction(&self) -> f64 {
         (self.now_ns - self.tick_began_ns) as f64 / (self.tick_ends_ns - self.tick_began_ns) as f64
     }
@@ -489,7 +494,7 @@ impl World {
         self.over_tip_mm(&self.surface) + self.stage.heave_mm()
     }
 
-    /// How far a sample reaches over the undeformed tip, mm.
+    /// Height of a sample over the undeformed tip, mm.
     fn over_tip_mm(&self, surface: &Surface) -> f64 {
         let thickness_mm = surface.thickness_mm();
         let top_mm = if self.setup.shimmed {

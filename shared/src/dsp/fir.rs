@@ -4,7 +4,7 @@
 //! were cut into blocks, nor on the machine.
 
 use super::kernels::Kernels;
-use super::plan::{HISTORY, Taps};
+use super::plan::{HISTORY, Plan};
 
 /// Samples filtered at once, whole twelves for kernels that take so many. No result depends on it.
 const BLOCK: usize = 264;
@@ -38,43 +38,43 @@ impl Default for BandPower {
 
 impl BandPower {
     /// Takes samples into the filter's memory without counting their power: what comes before the steady window.
-    pub fn prime<K: Kernels>(&mut self, taps: &Taps, samples: &[i16]) {
-        self.flush::<K>(taps);
+    pub fn prime(&mut self, plan: &Plan, samples: &[i16]) {
+        self.flush(plan);
         let (energy, outputs) = (self.energy, self.outputs);
         let last = samples.len().saturating_sub(HISTORY);
-        self.push::<K>(taps, samples.get(last..).unwrap_or_default());
-        self.flush::<K>(taps);
+        self.push(plan, samples.get(last..).unwrap_or_default());
+        self.flush(plan);
         (self.energy, self.outputs) = (energy, outputs);
     }
 
     /// Filters samples (counts about the still baseline; beyond what 12 bits can differ by they are clipped) and counts
     /// their power.
-    pub fn push<K: Kernels>(&mut self, taps: &Taps, samples: &[i16]) {
+    pub fn push(&mut self, plan: &Plan, samples: &[i16]) {
         let mut samples = samples;
         while !samples.is_empty() {
-            samples = self.take::<K>(samples);
+            samples = self.take(plan.kernels(), samples);
             if self.filled >= BLOCK {
-                self.flush::<K>(taps);
+                self.flush(plan);
             }
         }
     }
 
     /// Takes as many samples as the block has room for, and gives the others back.
-    fn take<'s, K: Kernels>(&mut self, samples: &'s [i16]) -> &'s [i16] {
+    fn take<'s>(&mut self, kernels: &Kernels, samples: &'s [i16]) -> &'s [i16] {
         let buffer = self.samples.0.get_mut(HISTORY + self.filled..);
         let buffer = buffer.unwrap_or_default();
         let many = samples.len().min(buffer.len());
         let (now, later) = samples.split_at_checked(many).unwrap_or_default();
-        K::clip(now, buffer.get_mut(..many).unwrap_or_default());
+        (kernels.clip)(now, buffer.get_mut(..many).unwrap_or_default());
         self.filled += many;
         later
     }
 
     /// Sum of squares of all outputs in Q14 counts^2, and their number.
-    fn flush<K: Kernels>(&mut self, taps: &Taps) {
+    fn flush(&mut self, plan: &Plan) {
         let filled = self.filled.min(BLOCK);
-        self.energy += K::band_energy(
-            taps,
+        self.energy += (plan.kernels().band_energy)(
+            plan.taps(),
             self.samples.0.get(..HISTORY + filled).unwrap_or_default(),
         );
         self.outputs += filled as u32;
@@ -83,8 +83,8 @@ impl BandPower {
     }
 
     /// Mean power in counts^2 of all samples pushed so far, and `None` before the first.
-    pub fn mean<K: Kernels>(&mut self, taps: &Taps) -> Option<f32> {
-        self.flush::<K>(taps);
+    pub fn mean(&mut self, plan: &Plan) -> Option<f32> {
+        self.flush(plan);
         (self.outputs > 0)
             .then(|| (self.energy as f64 / (1u32 << 14) as f64 / f64::from(self.outputs)) as f32)
     }
@@ -92,7 +92,6 @@ impl BandPower {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kernels::Plain;
     use super::super::plan::tests::gain;
     use super::*;
     use crate::sensor::pressure::RATE_HZ;
@@ -108,13 +107,13 @@ mod tests {
                     as i16
             })
             .collect();
-        let taps = Taps::band_pass();
+        let plan = Plan::new();
         let mut power = BandPower::default();
         let (lead, rest) = sine.split_at(2200);
-        power.prime::<Plain>(&taps, lead);
-        power.push::<Plain>(&taps, rest);
+        power.prime(&plan, lead);
+        power.push(&plan, rest);
         let expected = 4.5e6 * gain(300.0) * gain(300.0);
-        let ratio = f64::from(power.mean::<Plain>(&taps).unwrap()) / expected;
+        let ratio = f64::from(power.mean(&plan).unwrap()) / expected;
         // samples are whole counts
         assert!((ratio - 1.0).abs() < 5e-4, "{ratio}");
     }
@@ -122,42 +121,44 @@ mod tests {
     #[test]
     fn full_scale_neither_overflows_nor_wraps() {
         // the worst input: the sign of every coefficient
-        let taps = Taps::band_pass();
-        let worst: Vec<i16> = taps
+        let plan = Plan::new();
+        let worst: Vec<i16> = plan
+            .taps()
             .reversed()
             .map(|&h| if h < 0 { i16::MIN } else { i16::MAX })
             .collect();
         let mut power = BandPower::default();
-        power.prime::<Plain>(&taps, &worst[..66]);
-        power.push::<Plain>(&taps, &worst[66..]);
-        let y: f64 = taps
+        power.prime(&plan, &worst[..66]);
+        power.push(&plan, &worst[66..]);
+        let y: f64 = plan
+            .taps()
             .as_slice()
             .iter()
             .map(|&h| f64::from(h).abs() / 32768.0 * if h < 0 { 4096.0 } else { 4095.0 })
             .sum();
-        let got = f64::from(power.mean::<Plain>(&taps).unwrap());
+        let got = f64::from(power.mean(&plan).unwrap());
         assert!((got / (y * y) - 1.0).abs() < 1e-4, "{got} {}", y * y);
     }
 
     #[test]
     fn no_samples_no_power() {
-        assert_eq!(BandPower::default().mean::<Plain>(&Taps::band_pass()), None);
+        assert_eq!(BandPower::default().mean(&Plan::new()), None);
     }
 
     proptest! {
         #[test]
         fn power_does_not_depend_on_the_blocks(samples in proptest::collection::vec(-3000i16..3000, 1..700), cuts in proptest::collection::vec(1usize..200, 1..20)) {
-            let taps = Taps::band_pass();
+            let plan = Plan::new();
             // straight from the definition, in f64
             let at = |n: isize| usize::try_from(n).ok().and_then(|n| samples.get(n)).map_or(0.0, |&x| f64::from(x));
             let oracle = (0..samples.len() as isize).map(|n| {
-                let y: f64 = taps.as_slice().iter().enumerate().map(|(k, &h)| f64::from(h) / 32768.0 * at(n - k as isize)).sum();
+                let y: f64 = plan.taps().as_slice().iter().enumerate().map(|(k, &h)| f64::from(h) / 32768.0 * at(n - k as isize)).sum();
                 y * y
             }).sum::<f64>() / samples.len() as f64;
 
             let mut whole = BandPower::default();
-            whole.push::<Plain>(&taps, &samples);
-            let whole = whole.mean::<Plain>(&taps).unwrap();
+            whole.push(&plan, &samples);
+            let whole = whole.mean(&plan).unwrap();
             // every output is rounded by at most half of 1/128 count
             let bound = 2.0 / 256.0 * oracle.sqrt() + 1e-4;
             prop_assert!((f64::from(whole) - oracle).abs() <= bound, "{whole} {oracle}");
@@ -167,10 +168,10 @@ mod tests {
             for n in cuts.iter().cycle() {
                 if rest.is_empty() { break; }
                 let (now, later) = rest.split_at((*n).min(rest.len()));
-                cut.push::<Plain>(&taps, now);
+                cut.push(&plan, now);
                 rest = later;
             }
-            prop_assert_eq!(cut.mean::<Plain>(&taps), Some(whole));
+            prop_assert_eq!(cut.mean(&plan), Some(whole));
         }
     }
 }

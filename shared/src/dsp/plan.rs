@@ -4,6 +4,7 @@ use core::f64::consts::{PI, TAU};
 
 use microfft::Complex32;
 
+use super::kernels::Kernels;
 use crate::sensor::pressure::RATE_HZ;
 
 /// Number of coefficients of the 66th-order filter.
@@ -16,20 +17,33 @@ pub(crate) const HISTORY: usize = TAPS - 1;
 /// Samples in a frame.
 pub const FRAME: usize = 512;
 
-/// The constants of every slide: the filter's coefficients, and the angles of window and transform.
+/// The constants of every slide: the filter's coefficients, the angles of window and transform, and the loops that go through
+/// them.
 #[derive(Clone, Debug)]
 pub struct Plan {
     taps: Taps,
     angles: Angles,
+    kernels: Kernels,
 }
 
 impl Plan {
-    /// Computes both; once per boot is enough.
+    /// Computes them, for the plain kernels; once per boot is enough.
     pub fn new() -> Self {
+        Self::with(Kernels::PLAIN)
+    }
+
+    /// As [`Plan::new`], for other kernels.
+    pub fn with(kernels: Kernels) -> Self {
         Self {
             taps: Taps::band_pass(),
             angles: angles(),
+            kernels,
         }
+    }
+
+    /// The loops that every slide goes through.
+    pub(super) fn kernels(&self) -> &Kernels {
+        &self.kernels
     }
 
     /// The filter's coefficients.
@@ -207,7 +221,7 @@ pub type Angles = [[f32; 2]; FRAME / 4];
 
 /// See [`Angles`].
 #[inline]
-pub fn angles() -> Angles {
+pub(super) fn angles() -> Angles {
     let mut angles = [[0.0; 2]; FRAME / 4];
     // a sine is a cosine a quarter of a turn later, and a cosine is the same on both sides of 0
     let pairs = COSINES.iter().zip(COSINES.iter().rev());

@@ -13,10 +13,8 @@
 use core::mem::MaybeUninit;
 use core::ops::Range;
 
-use microfft::Complex32;
-
-use super::kernels::{Kernels, Reals};
-use super::plan::{Angles, FRAME, Folded};
+use super::kernels::Kernels;
+use super::plan::{FRAME, Folded, Plan};
 use crate::sensor::pressure::RATE_HZ;
 
 /// Samples from one frame to the next.
@@ -61,15 +59,15 @@ impl FrameSum {
     };
 
     /// Adds the power of a frame that was folded once.
-    // not generic: compiled with this crate, for speed
-    #[inline(never)]
-    fn add(&mut self, angles: &Angles, folded: &mut Folded, kernels: FrameKernels) {
-        let FrameKernels {
+    fn add(&mut self, plan: &Plan, folded: &mut Folded) {
+        let Kernels {
             fold,
             transform,
             transform_reals,
             add_power,
-        } = kernels;
+            ..
+        } = *plan.kernels();
+        let angles = plan.angles();
         let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
             return;
         };
@@ -141,25 +139,6 @@ impl FrameSum {
     }
 }
 
-/// Those of [`Kernels`] that a frame takes.
-struct FrameKernels {
-    fold: fn(&Angles, &[Complex32], &mut [Complex32]),
-    transform: fn(&Angles, &mut [Complex32]),
-    transform_reals: for<'r> fn(&Angles, &'r mut Reals) -> &'r mut [Complex32; FRAME / 16],
-    add_power: fn(&[Complex32], &mut [f32]),
-}
-
-impl FrameKernels {
-    const fn of<K: Kernels>() -> Self {
-        Self {
-            fold: K::fold,
-            transform: K::transform,
-            transform_reals: K::transform_reals,
-            add_power: K::add_power,
-        }
-    }
-}
-
 /// The spectrum of a slide while its samples arrive.
 #[derive(Clone, Debug)]
 pub struct SpectrumSum {
@@ -185,15 +164,16 @@ impl Default for SpectrumSum {
 
 impl SpectrumSum {
     /// Takes samples, in blocks of any size. None is outside -16384..=16383.
-    pub fn push<K: Kernels>(&mut self, angles: &Angles, samples: &[i16]) {
+    pub fn push(&mut self, plan: &Plan, samples: &[i16]) {
         let mut samples = samples;
         self.samples += samples.len() as u32;
         while !samples.is_empty() {
             samples = self.fill(samples);
             if self.filled >= FRAME {
                 let mut buffer = MaybeUninit::uninit();
-                let folded = K::fold_frame(angles, &self.frame, &mut buffer);
-                self.sum.add(angles, folded, FrameKernels::of::<K>());
+                let fold = plan.kernels().fold_frame;
+                let folded = fold(plan.angles(), &self.frame, &mut buffer);
+                self.sum.add(plan, folded);
                 self.frame.copy_within(HOP.., 0);
                 self.filled = FRAME - HOP;
             }
@@ -201,8 +181,6 @@ impl SpectrumSum {
     }
 
     /// Takes as many samples as the frame has room for; the others.
-    // not generic: compiled with this crate, for speed
-    #[inline(never)]
     fn fill<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
         let buffer = self.frame.get_mut(self.filled..).unwrap_or_default();
         let many = samples.len().min(buffer.len());
@@ -294,15 +272,13 @@ impl Spectrum {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kernels::Plain;
-    use super::super::plan::angles;
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec;
 
     fn spectrum(samples: &[i16]) -> Spectrum {
         let mut sum = SpectrumSum::default();
-        sum.push::<Plain>(&angles(), samples);
+        sum.push(&Plan::new(), samples);
         sum.finish().unwrap()
     }
 
@@ -381,7 +357,7 @@ mod tests {
     fn silence_has_no_centroid_and_less_than_a_frame_no_spectrum() {
         assert_eq!(spectrum(&[0; FRAME]).centroid_hz(), None);
         let mut sum = SpectrumSum::default();
-        sum.push::<Plain>(&angles(), &[1; FRAME - 1]);
+        sum.push(&Plan::new(), &[1; FRAME - 1]);
         assert_eq!(sum.finish(), None);
         assert_eq!(sum.samples(), 511);
     }
@@ -394,7 +370,7 @@ mod tests {
             for n in cuts.iter().cycle() {
                 if rest.is_empty() { break; }
                 let (now, later) = rest.split_at((*n).min(rest.len()));
-                cut.push::<Plain>(&angles(), now);
+                cut.push(&Plan::new(), now);
                 rest = later;
             }
             prop_assert_eq!(cut.finish(), Some(spectrum(&samples)));

@@ -1,7 +1,6 @@
 //! Which textures an exploration tells apart, and by which actions.
 
 use super::config::{Config, ExplorerError, Method};
-use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
 use super::posterior::{Explorer, OUT};
 use super::student::ShrinkagePrior;
@@ -9,7 +8,7 @@ use crate::features::{Property, PropertySet};
 use crate::table::{Action, Contents, Table};
 use crate::up_to;
 
-impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
+impl<'t, const N: usize> Explorer<'t, N> {
     /// An explorer for all textures of the table, for a rig that measures `measured`.
     ///
     /// # Errors
@@ -42,8 +41,6 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     ///
     /// # Errors
     /// See [`ExplorerError`]; it is of no use then.
-    // with a method that is known while compiling, what the others take is left out
-    #[inline(always)]
     pub(crate) fn consider(
         &mut self,
         measured: PropertySet,

@@ -1,15 +1,17 @@
 //! The next movement: the one that should leave the least confusion among the textures that are still likely (eq. 7, 11-13).
 
-use heapless::{Vec, VecView};
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::config::{Method, NEGLIGIBLE, Strategy};
-use super::kernels::{Kernels, LiveGaussian, LiveTexture, confused, exp_neg, left};
+use super::gaussians::{
+    self, LiveGaussian, LiveTexture, confused, exp_neg, uncertainty_of, uncertainty_of_one,
+};
+use super::likeness;
 use super::objective::{Objective, SlideTime};
 use super::posterior::Explorer;
-use super::whitened;
 use crate::features::Property;
-use crate::table::{Action, Gaussian, MAX_ACTIONS, Table};
+use crate::table::{Action, Gaussian, MAX_ACTIONS};
 
 /// Slides of a movement that come to nothing, one after the other, before it is left out for the rest of the exploration.
 const TRIES: u8 = 2;
@@ -36,11 +38,11 @@ impl ExpectedOutcome {
 }
 
 /// Degree of confusion of two textures by one property (eq. 7): 1 for equal, 0 for disjoint distributions.
-pub fn confusion<K: Kernels>(a: Gaussian, b: Gaussian) -> f32 {
-    confused(a, b, K::sqrt)
+pub fn confusion(a: Gaussian, b: Gaussian) -> f32 {
+    confused(a, b)
 }
 
-impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+impl<const N: usize> Explorer<'_, N> {
     /// The slide that `action` asked for came to nothing: it was not made, or it gave no features. Its movement is tried
     /// once more, then left out for the rest of this exploration. Whether anything is left to choose from.
     pub fn reject(&mut self, action: Action) -> bool {
@@ -182,17 +184,17 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     pub(super) fn uncertainty(&self, method: Method, action: Action) -> f32 {
         let movement = action.movement;
         if method == Method::Fused {
-            return whitened::uncertainty::<K, N>(&self.table, movement, &self.posterior);
+            return likeness::uncertainty::<N>(&self.table, movement, &self.posterior);
         }
         if let Some(property) = self.only_property(action) {
             let mut live: Vec<LiveGaussian, N> = Vec::new();
             let action = Action::of(movement, property);
             self.gather_one(method, action, &self.posterior, &mut live);
-            return uncertainty_of_one(&mut live, K::confuse);
+            return uncertainty_of_one(&mut live);
         }
         let mut live: Vec<LiveTexture, N> = Vec::new();
         self.gather(action, &self.posterior, &mut live);
-        uncertainty_of(&mut live, self.measured.iter().count(), K::sqrt)
+        uncertainty_of(&mut live, self.measured.iter().count())
     }
 
     /// The one property that `action` looks at; `None` where these are several.
@@ -203,8 +205,6 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
     }
 
     /// The textures that are still likely, with what is expected of the property that `action` looks at.
-    // where a method is known while compiling, what the others take is left out here as well
-    #[inline(always)]
     pub(super) fn gather_one(
         &self,
         method: Method,
@@ -213,14 +213,14 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         live: &mut Vec<LiveGaussian, N>,
     ) {
         if method == Method::Paper {
-            return gather_one(&self.table, action, posterior, live, K::sqrt);
+            return gaussians::gather_one(&self.table, action, posterior, live);
         }
         for (&probability, texture) in posterior.iter().zip(0..) {
             if probability >= NEGLIGIBLE {
                 let expected = action
                     .property
                     .and_then(|property| self.expected(texture, action.movement, property));
-                push(live, probability, expected, K::sqrt);
+                gaussians::push(live, probability, expected);
             }
         }
     }
@@ -238,92 +238,6 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
                 let _ = live.push(candidate);
             }
         }
-    }
-}
-
-/// Of a property of which nothing was learned.
-const UNKNOWN: Gaussian = Gaussian { mean: 0.0, sd: 1.0 };
-
-// The loops over all textures are not generic: so they are compiled with this crate, for speed.
-
-/// The textures that are still likely, with what is expected of the property that is looked at.
-#[inline(never)]
-fn gather_one(
-    table: &Table<'_>,
-    action: Action,
-    posterior: &[f32],
-    live: &mut VecView<LiveGaussian>,
-    sqrt: fn(f32) -> f32,
-) {
-    let known = table.gaussians(action);
-    for (&probability, texture) in posterior.iter().zip(0..) {
-        if probability >= NEGLIGIBLE {
-            let known = known.get(texture);
-            let candidate = LiveGaussian::new(probability, known.unwrap_or(UNKNOWN), sqrt);
-            // `live` has space: it is as long as the posterior
-            let _ = live.push(candidate);
-        }
-    }
-}
-
-/// One more of the textures that are still likely.
-#[inline(never)]
-fn push(
-    live: &mut VecView<LiveGaussian>,
-    probability: f32,
-    expected: Option<Gaussian>,
-    sqrt: fn(f32) -> f32,
-) {
-    // `live` has space: it is as long as the posterior
-    let _ = live.push(LiveGaussian::new(
-        probability,
-        expected.unwrap_or(UNKNOWN),
-        sqrt,
-    ));
-}
-
-/// Expected uncertainty (eq. 11) of these textures.
-#[inline(never)]
-fn uncertainty_of_one(
-    live: &mut [LiveGaussian],
-    confuse: fn(&mut LiveGaussian, &mut [LiveGaussian]),
-) -> f32 {
-    let mut rest = &mut *live;
-    while let Some((a, others)) = rest.split_first_mut() {
-        confuse(a, others);
-        rest = others;
-    }
-    live.iter()
-        .map(|c| left(c.weight, c.root, c.confused))
-        .sum()
-}
-
-/// Expected uncertainty (eq. 11) of these textures, of which so many properties are looked at.
-#[inline(never)]
-fn uncertainty_of(live: &mut [LiveTexture], properties: usize, sqrt: fn(f32) -> f32) -> f32 {
-    let mut rest = &mut *live;
-    while let Some((a, others)) = rest.split_first_mut() {
-        confuse_with(a, others, properties, sqrt);
-        rest = others;
-    }
-    live.iter()
-        .map(|c| left(c.probability, 1.0, c.confused))
-        .sum()
-}
-
-/// Confusion of one texture with all others (eq. 7), by so many properties.
-#[inline(always)]
-pub(super) fn confuse_with(
-    a: &mut LiveTexture,
-    others: &mut [LiveTexture],
-    properties: usize,
-    sqrt: fn(f32) -> f32,
-) {
-    for b in others {
-        let pairs = a.expected.iter().zip(&b.expected).take(properties);
-        let confusion: f32 = pairs.map(|(a, b)| confused(*a, *b, sqrt)).product();
-        a.confused += confusion * b.probability;
-        b.confused += confusion * a.probability;
     }
 }
 

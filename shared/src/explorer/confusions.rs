@@ -3,11 +3,11 @@
 
 use heapless::Vec;
 
-use super::choice::{ExpectedOutcome, benefit, confuse_with};
+use super::choice::{ExpectedOutcome, benefit};
 use super::config::{Method, NEGLIGIBLE};
-use super::kernels::{Candidate, Kernels, LiveGaussian, LiveTexture, left};
+use super::gaussians::{self, LiveGaussian, LiveTexture, confuse_with, left};
+use super::likeness::{self, Candidate};
 use super::posterior::{Explorer, LEAST};
-use super::whitened;
 use crate::table::{Action, MAX_ACTIONS};
 
 /// Actions side by side in [`Degrees`].
@@ -30,16 +30,13 @@ pub struct Confusions<M> {
 
 impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
     /// How much memory those of an explorer take.
-    pub fn len_for<const N: usize, K>(explorer: &Explorer<'_, N, K>) -> usize {
+    pub fn len_for<const N: usize>(explorer: &Explorer<'_, N>) -> usize {
         let textures = explorer.posterior.len();
         explorer.actions.len().div_ceil(LANES) * textures * (textures + 1)
     }
 
     /// Computes them; `None` where the memory is not as large as [`Confusions::len_for`] says.
-    pub fn new<const N: usize, K: Kernels>(
-        explorer: &Explorer<'_, N, K>,
-        mut memory: M,
-    ) -> Option<Self> {
+    pub fn new<const N: usize>(explorer: &Explorer<'_, N>, mut memory: M) -> Option<Self> {
         let all = memory.as_mut();
         if all.len() != Self::len_for(explorer) {
             return None;
@@ -75,7 +72,7 @@ impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
     }
 }
 
-impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+impl<const N: usize> Explorer<'_, N> {
     /// As [`Explorer::expected_outcomes`], to the bit, by degrees of confusion that were computed before: of an explorer of
     /// the same table, candidates and method.
     pub fn expected_outcomes_by(
@@ -119,7 +116,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             .collect()
     }
 
-    /// Passes `tell` the degree of confusion of every two candidates by an action, as the kernels compute it: these add it
+    /// Passes `tell` the degree of confusion of every two candidates by an action, as a decision computes it: that adds it
     /// to both, times a probability that is 1 here; and a candidate's own root, where it has one.
     fn confuse_all(&self, action: Action, mut tell: impl FnMut(usize, Option<usize>, f32)) {
         let is_candidate = |log: &i32| *log >= LEAST;
@@ -133,9 +130,14 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let method = self.config.method;
         if method == Method::Fused {
             let mut live: Vec<Candidate, N> = Vec::new();
-            let confuse = whitened::gather::<K>(&self.table, action.movement, &certain, &mut live);
-            let confuse = |a: &mut Candidate, others: &mut [Candidate]| confuse.with(a, others);
-            confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
+            likeness::gather(&self.table, action.movement, &certain, &mut live);
+            confuse_each(
+                &mut live,
+                &candidates,
+                likeness::confuse,
+                |c| &mut c.confused,
+                tell,
+            );
         } else if let Some(property) = self.only_property(action) {
             let mut live: Vec<LiveGaussian, N> = Vec::new();
             let action = Action::of(action.movement, property);
@@ -147,7 +149,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             confuse_each(
                 &mut live,
                 &candidates,
-                K::confuse,
+                gaussians::confuse,
                 |c| &mut c.confused,
                 tell,
             );
@@ -156,7 +158,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             self.gather(action, &certain, &mut live);
             let properties = self.measured.iter().count();
             let confuse = |a: &mut LiveTexture, others: &mut [LiveTexture]| {
-                confuse_with(a, others, properties, K::sqrt);
+                confuse_with(a, others, properties);
             };
             confuse_each(&mut live, &candidates, confuse, |c| &mut c.confused, tell);
         }

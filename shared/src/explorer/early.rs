@@ -4,7 +4,6 @@
 //! read once. So it is read at a few lengths only, and has to be more certain than at the end of a slide.
 
 use super::config::{Method, ObserveError};
-use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
 use super::posterior::{Explorer, LEAST};
 use crate::features::Observation;
@@ -39,7 +38,7 @@ pub const fn most_doubt(method: Method) -> Option<f32> {
     }
 }
 
-impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+impl<const N: usize> Explorer<'_, N> {
     /// What the exploration would say if the slide of an action ended now, at the `n`th length of the table, from 1. The
     /// exploration stands as it was. `None`: the table does not know how slides of that length are for every candidate, or the
     /// method cannot tell.

@@ -2,20 +2,23 @@
 
 use super::config::{Method, ObserveError};
 use super::episode::one_more;
-use super::kernels::Kernels;
 use super::paced;
 use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
+use crate::dsp::fixed::ln_q16;
 use crate::features::{Observation, Property};
-use crate::table::{Action, Against, Contents, Gaussian, mean_step};
+use crate::table::{Action, Against, Contents, Gaussian, Gaussians, mean_step};
 
 /// Most that the likelihood of a slide takes from a logarithm.
 const MOST: i32 = 1 << 26;
 /// Slides after which the greatest logarithm is made 0 again. Four times [`MOST`] below [`FLOOR`] is not [`LEAST`] yet.
 const SLIDES: u8 = 4;
 
-impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+/// A property this many standard deviations off, squared and halved, counts as no farther: 1024 in Q16.
+const MOST_OFF: i32 = (1 << 26) - 1;
+
+impl<const N: usize> Explorer<'_, N> {
     /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The rest
     /// of the slide is not used.
     ///
@@ -33,8 +36,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         Ok(())
     }
 
-    /// What a slide says of every candidate.
-    #[inline(always)]
+    /// Compares a slide with every candidate.
     pub(super) fn compare(
         &mut self,
         action: Action,
@@ -47,8 +49,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         }
     }
 
-    /// One slide more, of the action at this place.
-    #[inline(always)]
+    /// Counts one slide more, of the action at this place.
     pub(super) fn count(&mut self, made: usize, action: Action) {
         if let Some(made) = self.made.get_mut(made) {
             *made = made.saturating_add(1);
@@ -80,7 +81,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         }
         if self.config.method == Method::Paper {
             let known = self.table.gaussians(action);
-            K::add_gaussians(x / mean_step(property), &known, &mut self.log);
+            add_gaussians(x / mean_step(property), &known, &mut self.log);
         } else {
             self.add_students(x, action.movement, property, 1);
         }
@@ -159,7 +160,7 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
         let Some(vector) = slide.vector(set, features) else {
             return Err(ObserveError::Features(set));
         };
-        let Some(white) = self.table.whiten_by(action.movement, &vector, K::products) else {
+        let Some(white) = self.table.whiten(action.movement, &vector) else {
             return Err(ObserveError::Features(set));
         };
         if let Some(sums) = one_more(&mut self.episode, action.movement) {
@@ -190,7 +191,6 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
                 true,
                 &mut self.log,
                 &mut self.posterior,
-                K::add_likelihoods,
             )
         };
         let (top, sum) = self.normalize();
@@ -231,5 +231,21 @@ impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
             .table
             .gaussian(texture, Action::of(movement, property))?;
         Some((*shrinkage, known, self.table.trials(texture, movement)))
+    }
+}
+
+/// Adds the likelihood (eq. 4; ln, Q16, up to a constant) of every texture when a property is `x`, in steps of the means.
+/// Where nothing was learned, the standard deviation is 0, it adds nothing.
+#[inline(never)]
+fn add_gaussians(x: f32, known: &Gaussians<'_>, logs: &mut [i32]) {
+    let scale = known.scale();
+    for (log, [mean, sd]) in logs.iter_mut().zip(known.cells()) {
+        let (mean, sd) = (mean as i16, sd);
+        if sd > 0 {
+            let z = (x - f32::from(mean)) / f32::from(sd) * scale;
+            // to the nearest number that 32 bits hold
+            let off = (z * z) as i32;
+            *log -= off.min(MOST_OFF) + ln_q16(u64::from(sd) << 16);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What a texture that the table does not have is like: as its table says, or where that does not say, by its means.
 
-use super::kernels::DEGREES_OF_FREEDOM;
+use super::spread::DEGREES_OF_FREEDOM;
 use crate::features::{MAX_FEATURES, Vector};
 use crate::table::{Contents, Table, oas, white};
 
@@ -35,8 +35,6 @@ pub(super) struct NoveltyModel {
     farthest: f32,
     /// See [`student_norm`].
     norm: f32,
-    /// From how many slides all textures were learned, if it was as many.
-    pub(super) slides: Option<u8>,
 }
 
 impl NoveltyModel {
@@ -46,9 +44,6 @@ impl NoveltyModel {
     }
 
     pub(super) fn new(table: &Table<'_>, movement: u8) -> Self {
-        let slides = table.trials(0, movement);
-        let same = (0..table.textures()).all(|texture| table.trials(texture, movement) == slides);
-        let slides = same.then_some(slides);
         if let (Contents::Fused(_, features), Some(_)) = (table.contents(), table.limits()) {
             return Self {
                 movement,
@@ -57,7 +52,6 @@ impl NoveltyModel {
                 source: Source::Table,
                 farthest: farthest(features),
                 norm: student_norm(features.into()),
-                slides,
             };
         }
         let mut count = 0;
@@ -85,7 +79,6 @@ impl NoveltyModel {
             },
             farthest: f32::INFINITY,
             norm: 0.0,
-            slides,
         };
         if known {
             for ((variance, sum), squares) in model.variance.iter_mut().zip(sum).zip(squares) {

@@ -4,10 +4,11 @@
 /// Steps of [`OVERLAP`] up to 25 octaves.
 const STEPS: usize = 31;
 
-/// Coefficients, from the constant one on, of what 2 to the power of -(5 z / 31)^2 is around each whole z from -32 on, and
-/// towards the next one away from 0: the overlap of two densities of the same width, at most 5e-5 off. From 31 on, beyond 25
-/// octaves, it is half of the last place of a number near 1: 0. The fourth number is nothing: 16 bytes are easily found.
-pub const OVERLAP: [[f32; 4]; 64] = overlap();
+/// Coefficients, from the constant one on, of a 32nd of 2 to the power of -(5 z / 31)^2 around each whole z from 0 to 31, then
+/// from -32 to -1, and towards the next one away from 0: the overlap of two densities of the same width, at most 5e-5 off.
+/// From 31 on, beyond 25 octaves, it is half of the last place of a number near 1: 0. The fourth number is nothing: 16 bytes
+/// are easily found.
+pub(super) const OVERLAP: [[f32; 4]; 64] = overlap();
 
 #[expect(
     clippy::indexing_slicing,
@@ -19,7 +20,7 @@ const fn overlap() -> [[f32; 4]; 64] {
     let (near, far) = (0.5 - 0.353_553_390_593_273_8, 0.5 + 0.353_553_390_593_273_8);
     let (at_near, at_far) = (overlap_at(near), overlap_at(far));
     let curve = (at_far - at_near) / (far - near);
-    table[32] = [(at_near - curve * near) as f32, 0.0, curve as f32, 0.0];
+    table[0] = coefficients([at_near - curve * near, 0.0, curve]);
     let mut n = 1;
     while n < STEPS {
         // through three points, where Chebyshev has them
@@ -32,17 +33,25 @@ const fn overlap() -> [[f32; 4]; 64] {
         ];
         let slope = (high - low) / (2.0 * reach);
         let curve = (high - 2.0 * centre + low) / (2.0 * reach * reach);
-        let coefficients = [
+        let [constant, linear, square] = [
             centre - slope * middle + curve * middle * middle,
             slope - 2.0 * curve * middle,
             curve,
         ];
-        let [constant, linear, square] = coefficients;
-        table[32 + n] = [constant as f32, linear as f32, square as f32, 0.0];
-        table[32 - n] = [constant as f32, -linear as f32, square as f32, 0.0];
+        table[n] = coefficients([constant, linear, square]);
+        table[64 - n] = coefficients([constant, -linear, square]);
         n += 1;
     }
     table
+}
+
+const fn coefficients([constant, linear, square]: [f64; 3]) -> [f32; 4] {
+    [
+        constant as f32 / 32.0,
+        linear as f32 / 32.0,
+        square as f32 / 32.0,
+        0.0,
+    ]
 }
 
 /// 2 to the power of -25 z^2 / 31^2, of the square of z.
@@ -75,8 +84,8 @@ mod tests {
             let exact = (-25.0 / 961.0 * z * z).exp2();
             for z in [z as f32, -z as f32] {
                 let [constant, linear, square, _] =
-                    OVERLAP[((z as i32).clamp(-32, 31) + 32) as usize];
-                let overlap = f64::from(constant + (linear + square * z) * z);
+                    OVERLAP[(z as i32).clamp(-32, 31) as usize & 63];
+                let overlap = 32.0 * f64::from(constant + (linear + square * z) * z);
                 assert!((overlap - exact).abs() < 5e-5, "{z}: {overlap} {exact}");
             }
         }

@@ -6,8 +6,8 @@
 //! the squared distance r' V^-1 r then falls by p (r' V^-1 B)^2 / (1 + p B' V^-1 B), and ln |V| grows by ln(1 + p B' V^-1 B).
 
 use super::episode::{Episode, MovementSums};
-use super::kernels::{DEGREES_OF_FREEDOM, Spread};
 use super::novelty::{NoveltyModel, Source, student_norm};
+use super::spread::{DEGREES_OF_FREEDOM, Spread};
 use super::whitened::q16;
 use crate::dsp::fixed::ln_q16;
 use crate::features::{MAX_FEATURES, Vector};

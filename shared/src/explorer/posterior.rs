@@ -3,18 +3,15 @@
 //! Probabilities are kept as logarithms in fixed point, and in f32. Host and chip use the same operations in the same order,
 //! so they agree to the bit.
 
-use core::marker::PhantomData;
-
 use heapless::Vec;
 
 use super::config::{Config, Method};
 use super::episode::{Episode, MovementSums};
-use super::kernels::Kernels;
 use super::novelty::NoveltyModel;
 use super::paced;
 use super::student::ShrinkagePrior;
 use super::whitened;
-use crate::dsp::Plain;
+use crate::dsp::fixed::exp_neg_q30;
 use crate::features::{PropertySet, Vector};
 use crate::table::{Action, Against, Contents, Limits, MAX_ACTIONS, MAX_MOVEMENTS, Table};
 use crate::up_to;
@@ -80,7 +77,7 @@ impl Verdict {
 
 /// One exploration after another with the same table and candidates; room for `N` textures.
 #[derive(Clone, Debug)]
-pub struct Explorer<'t, const N: usize, K = Plain> {
+pub struct Explorer<'t, const N: usize> {
     pub(super) table: Table<'t>,
     pub(super) config: Config,
     pub(super) measured: PropertySet,
@@ -105,10 +102,9 @@ pub struct Explorer<'t, const N: usize, K = Plain> {
     pub(super) novelty_models: Vec<NoveltyModel, MAX_MOVEMENTS>,
     /// For the fused method: the table's, if it is calibrated.
     pub(super) limits: Option<Limits>,
-    pub(super) kernels: PhantomData<K>,
 }
 
-impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
+impl<'t, const N: usize> Explorer<'t, N> {
     /// One without candidates, for [`Explorer::consider`].
     pub(crate) fn empty(table: Table<'t>) -> Self {
         Self {
@@ -128,7 +124,6 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
             shrinkage: Vec::new(),
             novelty_models: Vec::new(),
             limits: None,
-            kernels: PhantomData,
         }
     }
 
@@ -263,8 +258,7 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
         let (elsewhere, _) = if table.is_paced() {
             paced::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
         } else {
-            let add = K::add_likelihoods;
-            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds, add)?
+            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
         };
         let top = log.iter().copied().max().unwrap_or(0);
         Some(elsewhere - top as f32 / 65536.0)
@@ -332,18 +326,14 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
 
     /// Logarithms as before the first slide.
     pub(super) fn reset_to_prior(&mut self) {
-        if usize::from(self.candidates) == self.log.len() {
-            K::reset_to_prior(&mut self.log);
-        } else {
-            for log in &mut self.log {
-                *log = if *log < LEAST { OUT } else { 0 };
-            }
+        for log in &mut self.log {
+            *log = if *log < LEAST { OUT } else { 0 };
         }
     }
 
     /// The posterior from its logarithms; the logarithm of the greatest likelihood, and the sum of all in parts of it, Q30.
     pub(super) fn normalize(&mut self) -> (f32, f32) {
-        let (top, sum) = K::posterior(&self.log, &mut self.posterior);
+        let (top, sum) = posterior(&self.log, &mut self.posterior);
         (top as f32 / 65536.0, sum)
     }
 
@@ -351,6 +341,24 @@ impl<'t, const N: usize, K: Kernels> Explorer<'t, N, K> {
     pub(super) fn mean_of(&self, sum: f32) -> f32 {
         libm::logf(sum / (1 << 30) as f32 / f32::from(self.candidates))
     }
+}
+
+/// Computes the posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of
+/// them, and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
+#[inline(never)]
+fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32) {
+    let top = logs.iter().copied().max().unwrap_or(0);
+    let mut sum = 0u64;
+    for (p, log) in posterior.iter_mut().zip(logs) {
+        let likely = exp_neg_q30(top.abs_diff(*log));
+        sum += u64::from(likely);
+        *p = likely as f32;
+    }
+    let total = sum as f32;
+    for p in posterior {
+        *p /= total;
+    }
+    (top, total)
 }
 
 /// Subtracts the greatest logarithm from all, so that the fixed point keeps its range for later slides.

@@ -10,7 +10,6 @@ mod rules;
 mod student;
 
 use super::*;
-use crate::dsp::Plain;
 use crate::features::{FeatureSet, Observation, Properties, Property, PropertySet, Vector};
 use crate::table::tests::{around, fixed, table_of};
 use crate::table::{Action, Gaussian, Table};
@@ -252,11 +251,11 @@ proptest! {
     fn confusion_is_the_overlap_of_two_densities(a in (-3f32..3.0, 0.05f32..2.0), b in (-3f32..3.0, 0.05f32..2.0)) {
         let gaussian = |(mean, sd)| Gaussian { mean, sd };
         let wide = |(mean, sd): (f32, f32)| (f64::from(mean), f64::from(sd));
-        let c = f64::from(confusion::<Plain>(gaussian(a), gaussian(b)));
+        let c = f64::from(confusion(gaussian(a), gaussian(b)));
         prop_assert!((c - eq7(wide(a), wide(b))).abs() < 1e-6);
         prop_assert!((c - eq6(wide(a), wide(b))).abs() < 1e-6);
-        prop_assert_eq!(confusion::<Plain>(gaussian(b), gaussian(a)), c as f32);
-        prop_assert!((confusion::<Plain>(gaussian(a), gaussian(a)) - 1.0).abs() < 1e-6);
+        prop_assert_eq!(confusion(gaussian(b), gaussian(a)), c as f32);
+        prop_assert!((confusion(gaussian(a), gaussian(a)) - 1.0).abs() < 1e-6);
     }
 
     #[test]

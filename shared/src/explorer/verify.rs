@@ -5,7 +5,6 @@
 //! texture differ, how fingers drift, and how textures differ.
 
 use super::answer::{Answer, Verification};
-use super::kernels::Kernels;
 use super::posterior::{Explorer, Verdict};
 use crate::features::Vector;
 use crate::table::Against;
@@ -13,7 +12,7 @@ use crate::table::Against;
 /// Slides from which a reference is not one of few any more.
 pub const ENOUGH_TRIALS: u8 = 3;
 
-impl<const N: usize, K: Kernels> Explorer<'_, N, K> {
+impl<const N: usize> Explorer<'_, N> {
     /// As [`Explorer::verdict`]; where the question is whether it is the only candidate, once that is answered, or the last
     /// slide was made.
     pub fn end(&self) -> Option<Verdict> {

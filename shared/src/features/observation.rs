@@ -86,7 +86,6 @@ pub struct Observation {
     pub pressure: Option<[i16; 2]>,
     /// Natural logarithm of the mean speed in parts of the movement's, in steps of 1/1024; `None` where it was not
     /// measured.
-    #[serde(default)]
     pub pace: Option<i16>,
 }
 

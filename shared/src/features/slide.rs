@@ -3,7 +3,6 @@
 //!
 //! Everything streams: a slide is taken in blocks of any size, and nothing but the final logarithms waits for its end.
 
-use core::marker::PhantomData;
 use core::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::block::{BLOCK, Block};
 use super::movement::Movement;
 use super::property::Properties;
-use crate::dsp::{BandPower, FRAME, Kernels, Plain, Plan, Spectrum, SpectrumSum, TAPS};
+use crate::dsp::{BandPower, FRAME, Plan, Spectrum, SpectrumSum, TAPS};
 
 /// Edges of eight bands from 20 to 1000 Hz in equal ratios, as half-open ranges of bins.
 pub const BAND_EDGES: [usize; 9] = [5, 8, 13, 21, 33, 54, 88, 143, 233];
@@ -76,7 +75,7 @@ pub enum SlideError {
 
 /// One slide while its samples arrive, as [`Block`]s: the movement that makes it, what has come, and what was lost.
 #[derive(Clone, Debug)]
-pub struct Slide<'p, K = Plain> {
+pub struct Slide<'p> {
     plan: &'p Plan,
     movement: Movement,
     /// Number of the next block.
@@ -94,10 +93,9 @@ pub struct Slide<'p, K = Plain> {
     pdc: (i64, u64, u32),
     pace: Option<i16>,
     lost: u32,
-    kernels: PhantomData<K>,
 }
 
-impl<'p, K: Kernels> Slide<'p, K> {
+impl<'p> Slide<'p> {
     /// The slide of a movement, of which nothing has happened yet.
     pub fn new(plan: &'p Plan, movement: Movement) -> Self {
         Self {
@@ -116,7 +114,6 @@ impl<'p, K: Kernels> Slide<'p, K> {
             pdc: (0, 0, 0),
             pace: None,
             lost: 0,
-            kernels: PhantomData,
         }
     }
 
@@ -130,8 +127,8 @@ impl<'p, K: Kernels> Slide<'p, K> {
         self.next
     }
 
-    /// Takes over all that another slide of the same movement has measured: its kernels differ in speed only.
-    pub fn adopt<L>(&mut self, other: &Slide<'_, L>) {
+    /// Takes over all that another slide of the same movement has measured, by a plan of its own.
+    pub fn adopt(&mut self, other: &Slide<'_>) {
         self.next = other.next;
         self.still = other.still.clone();
         self.still_samples = other.still_samples;
@@ -179,9 +176,9 @@ impl<'p, K: Kernels> Slide<'p, K> {
             .min(samples.len());
         let (fill, rest) = samples.split_at_checked(fill).unwrap_or((samples, &[]));
         if !fill.is_empty() {
-            self.still.prime::<K>(self.plan.taps(), fill);
+            self.still.prime(self.plan, fill);
         }
-        self.still.push::<K>(self.plan.taps(), rest);
+        self.still.push(self.plan, rest);
         self.still_samples = self.still_samples.saturating_add(samples.len());
     }
 
@@ -205,10 +202,10 @@ impl<'p, K: Kernels> Slide<'p, K> {
         let steady = samples.get(before..inside).unwrap_or_default();
         let before = samples.get(..before).unwrap_or_default();
         if !before.is_empty() {
-            self.power.prime::<K>(self.plan.taps(), before);
+            self.power.prime(self.plan, before);
         }
-        self.power.push::<K>(self.plan.taps(), steady);
-        self.spectrum.push::<K>(self.plan.angles(), steady);
+        self.power.push(self.plan, steady);
+        self.spectrum.push(self.plan, steady);
         self.position = end;
     }
 
@@ -267,14 +264,13 @@ impl<'p, K: Kernels> Slide<'p, K> {
         if got < wanted {
             return Err(SlideError::Unfinished { got, wanted });
         }
-        let taps = self.plan.taps();
-        let (Some(power), Some(spectrum)) = (self.power.mean::<K>(taps), self.spectrum.finish())
-        else {
+        let plan = self.plan;
+        let (Some(power), Some(spectrum)) = (self.power.mean(plan), self.spectrum.finish()) else {
             return Err(SlideError::TooShort(got));
         };
         let background = self
             .background
-            .or_else(|| self.still.mean::<K>(taps))
+            .or_else(|| self.still.mean(plan))
             .ok_or(SlideError::NoBackground)?;
         let centroid_hz = spectrum.centroid_hz().ok_or(SlideError::Silent)?;
         let (roughness, roughness_is_bound) = roughness(power, background);
@@ -371,7 +367,7 @@ mod tests {
         cuts: &[usize],
     ) -> Result<Measurement, SlideError> {
         let plan = Plan::new();
-        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
         slide.start(steady);
         let mut rest = samples;
@@ -390,7 +386,7 @@ mod tests {
     fn a_look_is_the_slide_that_ends_there_and_changes_nothing() {
         let samples = texture(6000);
         let plan = Plan::new();
-        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
         slide.start(300..6000);
         for end in [1400, 2500, 2777] {
@@ -442,7 +438,7 @@ mod tests {
             None
         );
         let plan = Plan::new();
-        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(0.0);
         slide.start(0..1000);
         slide.push(&samples);
@@ -458,7 +454,7 @@ mod tests {
         let still = texture(2000);
         let plan = Plan::new();
         let background = |blocks: &[&[i16]]| {
-            let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+            let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
             for block in blocks {
                 slide.push_still(block);
             }
@@ -469,9 +465,9 @@ mod tests {
         let whole = background(&[&still]).unwrap();
         // the definition: outputs of the filter from the 67th sample on
         let mut power = BandPower::default();
-        power.prime::<Plain>(plan.taps(), &still[..66]);
-        power.push::<Plain>(plan.taps(), &still[66..]);
-        assert_eq!(Some(whole), power.mean::<Plain>(plan.taps()));
+        power.prime(&plan, &still[..66]);
+        power.push(&plan, &still[66..]);
+        assert_eq!(Some(whole), power.mean(&plan));
         assert_eq!(
             background(&[&still[..20], &still[20..50], &still[50..]]),
             Ok(whole)
@@ -486,15 +482,13 @@ mod tests {
         use super::super::block::{Blocks, SamplePhase};
         let (still, moving) = (texture(500), texture(2000));
         let plan = Plan::new();
-        let mut by_hand = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        let mut by_hand = Slide::new(&plan, Movement::FOR_FINENESS);
         by_hand.push_still(&still);
         by_hand.start(100..1900);
         by_hand.push(&moving);
         by_hand.push_shear(&(0..900).map(|n| n - 300).collect::<Vec<i16>>());
-        let (mut blocks, mut slide) = (
-            Blocks::default(),
-            Slide::<Plain>::new(&plan, Movement::FOR_FINENESS),
-        );
+        let (mut blocks, mut slide) =
+            (Blocks::default(), Slide::new(&plan, Movement::FOR_FINENESS));
         let ticks = still.chunks(2).map(|pac| (SamplePhase::Still, pac, None));
         let slid = moving.chunks(2).zip(0..).map(|(pac, ms)| match ms {
             0 => (SamplePhase::Begin(100..1900), pac, None),
@@ -518,7 +512,7 @@ mod tests {
         // as are those that are cut afterwards
         let shear: Vec<i16> = (0..900).map(|n| n - 300).collect();
         let of = |missing| {
-            let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+            let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
             let blocks = Block::cut(&still, 100..1900, &moving, &shear);
             for block in blocks.filter(|block| Some(block.number) != missing) {
                 slide.take(&block);

@@ -1,4 +1,4 @@
-//! One button: a short press goes on, a long one takes.
+//! One button: a short press moves on, a long one takes.
 
 /// Equal looks that make a level, ticks: contacts bounce for less.
 const STEADY: u8 = 3;
@@ -22,7 +22,7 @@ pub(super) struct Button {
 }
 
 impl Button {
-    /// A look at the button.
+    /// Takes a look at the button.
     pub(super) fn tick(&mut self, pressed: bool) -> Option<Press> {
         self.other = if pressed == self.down {
             0
@@ -42,7 +42,7 @@ impl Button {
             (true, false) => {
                 let before = self.held;
                 self.held = self.held.saturating_add(1).min(LONG);
-                // said at once, while it is held
+                // reported at once, while it is held
                 (before < LONG && self.held == LONG).then_some(Press::Long)
             }
             (false, true) => (self.held < LONG).then_some(Press::Short),

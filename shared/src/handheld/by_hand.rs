@@ -1,5 +1,5 @@
-//! The probe in a hand as a [`Rig`]: a person makes its movements, asked on the display. So the core's [`Probe`] serves a
-//! host as a rig with motors does; between two requests the person uses it as if there were no host.
+//! The probe in a hand as a [`Rig`]: a person makes its movements, prompted on the display. So the core's [`Probe`]
+//! serves a host as a rig with motors does; between two requests the person uses it as if there were no host.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
@@ -8,8 +8,6 @@ use super::judge::{Judgement, MOVEMENT};
 use super::screen::{About, Screen};
 use super::speed::Moved;
 use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
-use crate::dsp;
-use crate::explorer::Kernels;
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, TableInUse, Watch};
@@ -25,7 +23,7 @@ use crate::wire::{Command, Event, Failure, Prompt, Request};
 
 /// Ticks from one picture to the next: 20 a second.
 const PICTURE: u32 = TICKS_HZ / 20;
-/// Ticks from one word to the host about what the person is to do to the next: it takes a silent probe for gone.
+/// Ticks between two reminders to the host of the person's task: it takes a silent probe for gone.
 const REMIND: u32 = TICKS_HZ;
 /// The host waits this long for a finger to be lifted, or a weight to be put on, ticks.
 const PATIENCE: u32 = 60 * TICKS_HZ;
@@ -33,13 +31,13 @@ const PATIENCE: u32 = 60 * TICKS_HZ;
 const AIR: u32 = 2 * TICKS_HZ;
 // a look at a weight is a tick
 const _: () = assert!(LOOKS_HZ == TICKS_HZ);
-/// Ticks within which a sensor that works again is noticed.
+/// Longest time until a sensor that works again is noticed, ticks.
 const CLEARED: u32 = TICKS_HZ;
 
-/// What a handheld probe is made of, on the chip or in a test.
+/// Parts of a handheld probe, on the chip or in a test.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Hand {
-    /// Whether its finger feels gravity.
+    /// True if its finger feels gravity.
     fn feels_gravity(&self) -> bool {
         false
     }
@@ -47,10 +45,10 @@ pub trait Hand {
     /// Waits for the next hundredth of a second.
     async fn wait(&mut self);
 
-    /// The oldest word of the sensor that nobody has taken.
+    /// Takes the oldest word of the sensor.
     fn word(&mut self) -> Option<Option<Pressure>>;
 
-    /// How far it has moved since this was asked last, by its sensor of motion, if there is one: see [`Handheld::moved`].
+    /// Motion since the last call, by its sensor of motion, if there is one: see [`Handheld::moved`].
     fn moved(&mut self) -> Option<Moved> {
         None
     }
@@ -60,10 +58,10 @@ pub trait Hand {
         None
     }
 
-    /// Whether the button is pressed.
+    /// Returns true if the button is pressed.
     fn is_pressed(&mut self) -> bool;
 
-    /// Has the sensor's words come, or not. Time may have passed without ticks before they come again.
+    /// Turns the sensor's words on or off. Time may have passed without ticks before they come again.
     fn listen(&mut self, on: bool);
 
     /// Sounds a tone, Hz, or none.
@@ -72,16 +70,16 @@ pub trait Hand {
     /// Shows a screen.
     fn show(&mut self, screen: &Screen<'_>);
 
-    /// What the page about the probe says, but for the calibration.
+    /// Facts of the page about the probe, without the calibration.
     fn about(&self) -> About;
 
-    /// So the probe is now: answered at any time.
+    /// Publishes the state of the probe, which is answered at any time.
     fn publish(&mut self, state: &RigState);
 
-    /// Whether the host stopped what it asked for.
+    /// Returns true if the host has stopped its request.
     fn is_stopped(&self) -> bool;
 
-    /// Whether the host wants raw samples.
+    /// Returns true if the host wants raw samples.
     fn streams(&self) -> bool;
 
     /// Sends an event to the host.
@@ -89,30 +87,30 @@ pub trait Hand {
 }
 
 /// A rig that is a person with a probe in the hand.
-pub struct ByHand<'p, H, K> {
+pub struct ByHand<'p, H> {
     /// Its parts.
     pub hand: H,
-    /// What the person sees.
-    pub handheld: Handheld<'p, K>,
+    /// State of the person's use: pages, touch and job.
+    pub handheld: Handheld<'p>,
     calibration: RigCalibration,
     skin: SkinCare,
     watch: Watch,
     listens: bool,
     tone: Option<u16>,
     ticks: u32,
-    /// What the host was told last of what the person is to do, and when.
+    /// Last prompt that was sent to the host, and its time.
     prompt: (Option<Prompt>, u32),
     /// The slide that the host wants next.
     asked: Asked,
     /// Share of the memory for textures that is taken.
     memory: f32,
-    /// What is done is done for the host.
+    /// True while it serves a request of the host.
     serves: bool,
 }
 
-impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
+impl<'p, H: Hand> ByHand<'p, H> {
     /// A probe that was just switched on, with a fingertip of these constants.
-    pub fn new(hand: H, handheld: Handheld<'p, K>, calibration: RigCalibration) -> Self {
+    pub fn new(hand: H, handheld: Handheld<'p>, calibration: RigCalibration) -> Self {
         let mut by_hand = Self {
             hand,
             handheld,
@@ -143,7 +141,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
         self.handheld.calibrate(scale);
     }
 
-    /// A hundredth of a second: words, button, buzzer, display, and what the host hears.
+    /// A hundredth of a second: words, button, buzzer, display, and the events for the host.
     pub async fn tick(&mut self) {
         self.hand.wait().await;
         self.ticks = self.ticks.wrapping_add(1);
@@ -180,7 +178,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
         self.remind();
     }
 
-    /// Has the sensor's words come while they are wanted.
+    /// Turns the sensor's words on while they are wanted.
     fn heed(&mut self) {
         if self.handheld.listens() != self.listens {
             self.listens = self.handheld.listens();
@@ -188,18 +186,18 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
         }
     }
 
-    /// The words do not come any more until the next tick that wants them: nobody takes them meanwhile.
+    /// Turns the words off until the next tick that wants them: no code takes them meanwhile.
     fn pause(&mut self) {
         self.hand.listen(false);
         self.listens = false;
         while let Some(word) = self.hand.word() {
             self.handheld.word(word);
         }
-        // what comes next does not follow what came
+        // the next words do not follow the last ones
         self.handheld.lose(1);
     }
 
-    /// Tells the host what the person is to do.
+    /// Sends the person's task to the host.
     fn remind(&mut self) {
         let prompt = self.handheld.prompt();
         let (told, at) = self.prompt;
@@ -221,7 +219,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
         self.hand.show(&screen);
     }
 
-    /// A tick of something that a person is asked for, and whether it can go on.
+    /// Waits a tick for the person; returns true if the waiting may continue.
     async fn go_on(&mut self) -> Result<Option<Answer>, RigError> {
         self.tick().await;
         if self.serves && self.hand.is_stopped() {
@@ -240,7 +238,7 @@ impl<'p, H: Hand, K: Kernels> ByHand<'p, H, K> {
     }
 }
 
-impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
+impl<H: Hand> Rig for ByHand<'_, H> {
     type Error = RigError;
 
     fn measures(&self) -> PropertySet {
@@ -249,7 +247,7 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
             .collect()
     }
 
-    async fn perform<D: dsp::Kernels>(&mut self, slide: &mut Slide<'_, D>) -> Result<(), RigError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), RigError> {
         if slide.movement() != MOVEMENT {
             return Err(RigError::NotByHand);
         }
@@ -269,15 +267,15 @@ impl<H: Hand, K: Kernels> Rig for ByHand<'_, H, K> {
             }
             self.go_on().await?;
         }
-        // what comes next may take long, and nobody takes words meanwhile
+        // the next step may take long, and no code takes words meanwhile
         self.pause();
         Ok(())
     }
 }
 
-impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
+impl<H: Hand> RigHandle for ByHand<'_, H> {
     fn state(&self) -> RigState {
-        // without words nobody knows what the finger does
+        // without words the finger's state is unknown
         let heard = self.handheld.listens();
         RigState {
             phase: self.handheld.phase(),
@@ -398,17 +396,17 @@ impl<H: Hand, K: Kernels> RigHandle for ByHand<'_, H, K> {
     }
 }
 
-/// Who hears what the probe does, and what of it the display shows in the end.
+/// A sink that passes the probe's events on and keeps the verdict for the display.
 #[derive(Debug)]
 pub struct Shown<E> {
     to: E,
     judgement: Judgement,
-    /// There was a verdict.
+    /// True if there was a verdict.
     told: bool,
 }
 
 impl<E: Events> Shown<E> {
-    /// Hands everything on to `to`.
+    /// Passes everything on to `to`.
     pub fn new(to: E) -> Self {
         Self {
             to,
@@ -417,7 +415,7 @@ impl<E: Events> Shown<E> {
         }
     }
 
-    /// The verdict that was told, once.
+    /// Takes the verdict; `None` the second time.
     fn judgement(&mut self) -> Option<Judgement> {
         core::mem::take(&mut self.told).then(|| core::mem::take(&mut self.judgement))
     }
@@ -455,15 +453,12 @@ impl<E: Events> Events for Shown<E> {
 }
 
 /// The probe in the hand of a person.
-pub type HandProbe<'m, H, K, F, B, E> = Probe<'m, ByHand<'m, H, K>, F, B, Shown<E>>;
+pub type HandProbe<'m, H, F, B, E> = Probe<'m, ByHand<'m, H>, F, B, Shown<E>>;
 
-/// A hundredth of a second of the person's own use, and what it has to be done with the table; `log` hears that.
-pub async fn step<H, K, F, B, E>(
-    probe: &mut HandProbe<'_, H, K, F, B, E>,
-    log: impl FnMut(Outcome<'_>),
-) where
+/// A hundredth of a second of the person's own use, with the job on the table, if there is one; `log` gets the outcome.
+pub async fn step<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, log: impl FnMut(Outcome<'_>))
+where
     H: Hand,
-    K: Kernels,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -505,7 +500,7 @@ pub async fn step<H, K, F, B, E>(
     }
 }
 
-/// What of a request the display names.
+/// The slides and the texture of a request that the display names.
 fn asked(command: &Command) -> (Asked, Option<Name>) {
     match command {
         Command::Identify(wanted) | Command::Verify(wanted) => (
@@ -520,11 +515,10 @@ fn asked(command: &Command) -> (Asked, Option<Name>) {
     }
 }
 
-/// Serves a request of the host, and shows what came of it.
-pub async fn serve<H, K, F, B, E>(probe: &mut HandProbe<'_, H, K, F, B, E>, request: &Request)
+/// Serves a request of the host, and shows its result.
+pub async fn serve<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, request: &Request)
 where
     H: Hand,
-    K: Kernels,
     F: NorFlash,
     B: StoredBytes<F>,
     E: Events,
@@ -535,7 +529,7 @@ where
     probe.rig.serves = true;
     probe.events.told = false;
     let before = probe.memory.table().ok().map(|table| table.crc());
-    let done = probe.perform::<K>(&request.command).await;
+    let done = probe.perform(&request.command).await;
     let table = probe.memory.table().ok();
     let after = table.map(|table| (table.crc(), table.textures()));
     let rig = &mut probe.rig;

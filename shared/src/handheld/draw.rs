@@ -1,7 +1,7 @@
 //! Draws what the display shows: the same on chip and PC.
 //!
-//! The display is 22 mm wide and read at arm's length: nothing is smaller than 6 x 10 points, and what matters is twice
-//! that. A line on top says where one is; a line at the bottom what the button does.
+//! The display is 22 mm wide and read at arm's length: nothing is smaller than 6 x 10 points, and the main text is
+//! twice that. A line on top names the page; a line at the bottom the button's actions.
 
 use core::fmt::Write as _;
 
@@ -39,7 +39,7 @@ fn ink(inverted: bool) -> BinaryColor {
     }
 }
 
-/// `text`, cut to so many letters, two points in place of what is missing.
+/// `text`, cut to so many letters, with two points in place of the rest.
 fn cut(text: &str, most: usize) -> String<40> {
     let letters = text.chars().count();
     let mut cut = String::new();
@@ -127,14 +127,14 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// Where one is.
+    /// Draws the page's title.
     fn title(&mut self, title: &str, right: &str) -> Done<D> {
         self.fill(0, 0, WIDTH, 12, false)?;
         self.write(title, 3, 1, &SMALL, Anchor::Left, true)?;
         self.write(right, WIDTH - 3, 1, &SMALL, Anchor::Right, true)
     }
 
-    /// What the button does: pressed, and held.
+    /// Draws the button's actions: pressed, and held.
     fn button(&mut self, press: &str, hold: &str) -> Done<D> {
         if !press.is_empty() {
             self.disc(4, 59, 2, false)?;
@@ -150,7 +150,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// The force, and where it is to be.
+    /// Draws the force and its zone.
     fn force(&mut self, force_mn: f32, y: i32) -> Done<D> {
         const INSIDE: i32 = WIDTH - 4;
         let x = |mn: f32| 2 + (INSIDE as f32 * (mn / BAR_MN).clamp(0.0, 1.0)) as i32;
@@ -178,7 +178,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     }
 }
 
-/// Whole percents; what is not all is not 100, and what is not nothing not 0.
+/// Whole percents; only the whole is 100, and only nothing is 0.
 fn percent(p: f32) -> String<8> {
     let mut text = String::new();
     // eight letters are enough
@@ -197,7 +197,7 @@ const fn date(day: u32) -> (u32, u32, u32) {
     (day / 10_000, day / 100 % 100, day % 100)
 }
 
-/// "slide 2 of 5", "slide 2" where nobody knows how many there are.
+/// "slide 2 of 5", or "slide 2" if the number of slides is unknown.
 fn count(slide: u8, of: u8) -> String<40> {
     match of {
         0 => say(format_args!("slide {slide}")),
@@ -205,7 +205,7 @@ fn count(slide: u8, of: u8) -> String<40> {
     }
 }
 
-/// The leading texture, if it is that.
+/// The leading texture, if it is worth a line.
 fn perhaps(rows: &[Row<'_>]) -> String<40> {
     let name = rows.first().map_or("?", |row| row.name);
     say(format_args!("{}?", cut(name, 20)))
@@ -219,7 +219,7 @@ fn below(name: &str) -> String<40> {
 /// Writes a short text.
 fn say(text: core::fmt::Arguments<'_>) -> String<40> {
     let mut said = String::new();
-    // cut off where it is too long
+    // cut off if it is too long
     let _ = said.write_fmt(text);
     said
 }
@@ -327,7 +327,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             open,
             trials,
         } => {
-            // fewer than `ENOUGH_TRIALS` are told
+            // fewer than `ENOUGH_TRIALS` are shown
             let next = match trials {
                 1 => "learned from 1 slide",
                 2 => "learned from 2 slides",
@@ -400,7 +400,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.button("menu", "teach")
     }
 
-    /// How far the slide ought to be, and how far it is, where that is seen: 5 cm while the bar fills.
+    /// The desired and the actual way of the slide, if a sensor sees it: 5 cm while the bar fills.
     fn pace(&mut self, progress: Option<f32>, way: Way, force_mn: f32) -> Done<D> {
         let Some(progress) = progress else {
             self.centre("Slide", 12, &LARGE)?;
@@ -537,7 +537,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// A sentence, and the button goes on.
+    /// A sentence, and the button moves on.
     fn sentence(&mut self, title: &str, text: &str) -> Done<D> {
         self.title(title, "")?;
         self.paragraph(text)?;

@@ -1,15 +1,15 @@
-//! What a person who presses and slides is told.
+//! Guidance of a person who presses and slides.
 
 use core::ops::RangeInclusive;
 
 use crate::features::Observation;
 
-/// The force that is asked for, mN: about [`super::judge::MOVEMENT`]'s, as wide as people hold it without looking.
+/// The zone of force to keep, mN: about [`super::judge::MOVEMENT`]'s, as wide as people hold it without looking.
 pub const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;
 
 pub use crate::wire::Again;
 
-/// What happens in a touch.
+/// Events of a touch.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Event {
     /// P_DC without contact is known.
@@ -20,7 +20,7 @@ pub enum Event {
     Still,
     /// It has slid well.
     Slid(Observation),
-    /// It has not; it is to be lifted.
+    /// The slide failed; the finger is to be lifted.
     Again(Again),
     /// It is up.
     Up,
@@ -30,7 +30,7 @@ pub enum Event {
     Frozen,
 }
 
-/// What a touch is at.
+/// Phases of a touch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Phase {
     /// In the air.
@@ -60,11 +60,11 @@ pub enum Way {
 /// A touch as it is shown.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct View {
-    /// What it is at.
+    /// Its phase.
     pub phase: Phase,
     /// Contact force, mN.
     pub force_mn: f32,
-    /// How much of the slide is done, 0 to 1.
+    /// Part of the slide that is done, 0 to 1.
     pub progress: f32,
     /// The way of the slide so far.
     pub way: Way,

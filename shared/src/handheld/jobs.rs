@@ -1,22 +1,21 @@
-//! What the handheld wants to be done with the table, for the task that owns it.
+//! Jobs of the handheld on the table, for the task that owns it.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::judge::{Judgement, free_name, judge};
 use super::states::{Choice, Handheld, Job};
-use crate::explorer::Kernels;
 use crate::probe::Memory;
 use crate::probe::seams::{Events, StoredBytes};
 use crate::store::StoreError;
 use crate::table::Name;
 use crate::wire::MemoryError;
 
-/// What came of a job, for the log.
+/// The outcome of a job, for the log.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Outcome<'j> {
     /// So many slides were judged.
     Judged {
-        /// How many.
+        /// Their number.
         slides: usize,
         /// Name of the leading texture, and its probability.
         leading: (&'j str, f32),
@@ -29,10 +28,10 @@ pub enum Outcome<'j> {
     NotLearned(&'static str),
 }
 
-/// Does a job, and tells the handheld what came of it; `log` hears it first.
-pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
+/// Does a job, and gives the handheld its outcome; `log` gets it first.
+pub async fn work<F: NorFlash, B: StoredBytes<F>>(
     job: Job,
-    handheld: &mut Handheld<'_, K>,
+    handheld: &mut Handheld<'_>,
     memory: &mut Memory<'_, F, B>,
     events: &mut impl Events,
     mut log: impl FnMut(Outcome<'_>),
@@ -43,8 +42,8 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                 Ok(table) => table,
                 Err(why) => return handheld.memory_failed(words(&why)),
             };
-            let judged = judge::<K>(table, &slides, reference, memory.false_alarm).map(
-                |(judgement, episode)| {
+            let judged =
+                judge(table, &slides, reference, memory.false_alarm).map(|(judgement, episode)| {
                     if let Some((texture, p)) = judgement.leading.first() {
                         log(Outcome::Judged {
                             slides: slides.len(),
@@ -53,8 +52,7 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
                         });
                     }
                     (judgement, episode)
-                },
-            );
+                });
             match judged {
                 Ok((judgement, episode)) => {
                     memory.episode = Some(episode);
@@ -72,7 +70,7 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>, K: Kernels>(
             let textures = memory.table().map_or(0, |table| table.textures());
             handheld.learned(learned, textures);
         }
-        // whoever has the finger does it
+        // the task with the finger does it
         Job::Calibrate => {}
         Job::TurnOver => {}
     }
@@ -100,7 +98,7 @@ async fn teach<F: NorFlash, B: StoredBytes<F>>(
     Ok(name)
 }
 
-/// What the display says of it, in its four lines of 21 letters; the host is told what it is made of.
+/// The error in the display's four lines of 21 letters; the host gets its parts.
 pub fn words(why: &MemoryError) -> &'static str {
     match why {
         MemoryError::NoEpisode => "There is no slide to learn from. Slide first.",

@@ -1,26 +1,27 @@
-//! What the slides of an episode say: which textures of the table are the most probable.
+//! Judgement of an episode's slides: the most probable textures of the table.
 
 use heapless::Vec;
 
 use crate::explorer::{
-    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Kernels, Method, ObserveError,
+    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
 use crate::probe::candidates;
 use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
-/// What a person is asked to do: half a newton, 25 mm/s.
+/// The person's movement: half a newton, 25 mm/s.
 pub const MOVEMENT: Movement = Movement::FOR_FINENESS;
 /// The features that a handheld's table is learned from.
 pub const FEATURES: FeatureSet = FeatureSet::Pressure;
-/// Slides after which the most probable texture is the answer, sure or not, and the person may go on.
+/// Slides after which the most probable texture is the verdict, sure or not, and the person may add more.
 pub const ASK_AFTER: usize = 5;
-/// Slides after which nobody is asked for more: in the simulated world the next two tell 1 % more textures, or 2 %.
+/// Slides after which the probe asks for no more: in the simulated world the next two identify 1 % more textures, or 2
+/// %.
 pub const MAX_SLIDES: usize = 10;
 /// Textures that a verdict shows.
 pub const LEADING: usize = 3;
 
-/// What the probe makes of an episode. Where the question is whether it is one texture, that is the leading one: it is `sure`
+/// The judgement of an episode. Where the question is whether it is one texture, that is the leading one: it is `sure`
 /// where it is the same, and `unknown` where it is different.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Judgement {
@@ -32,7 +33,7 @@ pub struct Judgement {
     pub unknown: bool,
     /// It is the first one, but not as it was learned.
     pub changed: bool,
-    /// Further slides may tell more.
+    /// Further slides may decide.
     pub open: bool,
 }
 
@@ -44,13 +45,13 @@ impl Judgement {
         self.changed = false;
     }
 
-    /// Whether the person is to be asked if it is the first one.
+    /// Returns true if the probe is to ask the person whether it is the first one.
     pub fn is_changed(&self) -> bool {
         self.changed && !self.unknown
     }
 }
 
-/// Why an episode cannot be judged.
+/// Reasons why an episode cannot be judged.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum JudgeError {
     /// The table cannot be used by a handheld probe.
@@ -63,16 +64,17 @@ pub enum JudgeError {
     #[error("the table has no movement")]
     Movement,
     /// The table has no limits, by which slides are the same as a texture's or different.
-    #[error("the table has no limits to tell same from different by")]
+    #[error("the table has no limits for same and different")]
     NoLimits,
 }
 
-/// Compares the slides of an episode with every texture of the table, or with `reference` alone: is it that one? Returns the
-/// judgement to show and the summary that the probe can learn from. The share of false alarms is the table's own, unless given.
+/// Compares the slides of an episode with every texture of the table, or with `reference` alone: is it that one?
+/// Returns the judgement to show and the summary that the probe can learn from. The share of false alarms is the
+/// table's own, unless given.
 ///
 /// # Errors
 /// The table is not one for a handheld probe, or a slide lacks a feature.
-pub fn judge<K: Kernels>(
+pub fn judge(
     table: Table<'_>,
     slides: &[Observation],
     reference: Option<u16>,
@@ -82,14 +84,14 @@ pub fn judge<K: Kernels>(
         Some(_) => ASK_AFTER,
         None => MAX_SLIDES,
     };
-    judge_at_most::<K>(table, slides, reference, false_alarm, most)
+    judge_at_most(table, slides, reference, false_alarm, most)
 }
 
 /// The same where `most` slides, up to 255, are the last ones, sure or not.
 ///
 /// # Errors
 /// See [`judge`].
-pub fn judge_at_most<K: Kernels>(
+pub fn judge_at_most(
     table: Table<'_>,
     slides: &[Observation],
     reference: Option<u16>,
@@ -104,7 +106,7 @@ pub fn judge_at_most<K: Kernels>(
         verify: reference.is_some(),
         ..Config::default()
     };
-    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    let mut explorer = Explorer::<'_, MAX_TEXTURES>::empty(table);
     let among = candidates(reference.as_slice(), table.textures());
     explorer
         .consider(PropertySet::default(), config, among)
@@ -156,7 +158,8 @@ pub(super) fn leading(posterior: &[f32]) -> Vec<(u16, f32), LEADING> {
     leading
 }
 
-/// The movement of the table that the person makes: the one nearest to [`MOVEMENT`] is the only one in a handheld's table.
+/// The movement of the table that the person makes: the one nearest to [`MOVEMENT`] is the only one in a handheld's
+/// table.
 fn movement(table: &Table<'_>) -> Option<u8> {
     let mut movements = table.movements().zip(0u8..);
     let first = movements.next();

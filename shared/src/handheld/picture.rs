@@ -1,5 +1,5 @@
-//! A picture of 128 x 64 points, in the order in which the display keeps them: eight pages of 128 columns, a byte each, its
-//! lowest bit on top.
+//! A picture of 128 x 64 points, in the order in which the display keeps them: eight pages of 128 columns, a byte each,
+//! its lowest bit on top.
 
 use core::convert::Infallible;
 
@@ -13,7 +13,7 @@ pub const WIDTH: usize = 128;
 /// Rows.
 pub const HEIGHT: usize = 64;
 
-/// What the display shows.
+/// A picture of the display.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Picture([u8; WIDTH * HEIGHT / 8]);
 
@@ -33,7 +33,7 @@ impl Picture {
         Self(bytes)
     }
 
-    /// Whether a point is lit; outside, none is.
+    /// Returns true if a point is lit; outside, none is.
     pub fn is_lit(&self, x: usize, y: usize) -> bool {
         let byte = (x < WIDTH).then(|| self.0.get(y / 8 * WIDTH + x)).flatten();
         byte.is_some_and(|byte| byte >> (y % 8) & 1 == 1)

@@ -1,4 +1,4 @@
-//! What the display shows, before it is drawn.
+//! Contents of the display, before they are drawn.
 
 use heapless::Vec;
 
@@ -12,12 +12,12 @@ use crate::table::Name;
 /// Entries of a list that are shown at once.
 pub const LINES: usize = 4;
 
-/// What keeps the probe from working.
+/// Troubles that keep the probe from working.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Trouble {
     /// No readable word of the sensor.
     Silent,
-    /// P_AC never changes, which always has noise.
+    /// P_AC, which always has noise, never changes.
     Frozen,
     /// The table or the store.
     Memory(&'static str),
@@ -41,7 +41,7 @@ pub enum Entry<'a> {
     Numbered(Name),
 }
 
-/// What the page about the probe says.
+/// Facts of the page about the probe.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct About {
     /// Version of the firmware.
@@ -54,13 +54,13 @@ pub struct About {
     pub late: u32,
     /// Words that were lost.
     pub lost: u32,
-    /// Day on which the force was set by weights, as 20261121; 0 if it was not, 1 where the day is not known.
+    /// Day on which the force was set by weights, as 20261121; 0 if it was not, 1 if the day is unknown.
     pub calibrated: u32,
     /// Share of the memory for textures that is taken, 0 to 1.
     pub memory: f32,
 }
 
-/// What the display shows.
+/// The screens.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Screen<'a> {
     /// The finger is to be held in the air: P_DC's zero is taken.
@@ -74,7 +74,7 @@ pub enum Screen<'a> {
     Press {
         /// The slide it is for.
         slide: u8,
-        /// How many there can be.
+        /// Largest number of slides.
         of: u8,
         /// Contact force, mN.
         force_mn: f32,
@@ -89,14 +89,14 @@ pub enum Screen<'a> {
         of: u8,
         /// As in `Press`.
         force_mn: f32,
-        /// How much is done, 0 to 1; `None` before it begins.
+        /// Part that is done, 0 to 1; `None` before it begins.
         progress: Option<f32>,
         /// The way so far.
         way: Way,
     },
     /// The slide is made: the finger is to be lifted.
     Lift {
-        /// Which it was.
+        /// Its number.
         slide: u8,
     },
     /// A known weight is to be put on the finger.
@@ -113,23 +113,23 @@ pub enum Screen<'a> {
     },
     /// A slide was no good.
     Again {
-        /// Why.
+        /// The reason.
         why: Again,
         /// The finger is still down.
         lift: bool,
     },
     /// The slides are compared.
     Thinking {
-        /// How many.
+        /// Their number.
         slide: u8,
     },
-    /// What it is.
+    /// The verdict.
     Verdict {
         /// The leading candidates.
         rows: Vec<Row<'a>, LEADING>,
         /// The first one is 99 % sure.
         sure: bool,
-        /// Further slides may tell more; then there are two rows at most.
+        /// Further slides may decide; then there are two rows at most.
         open: bool,
     },
     /// It is one of those known, but not as it was learned.
@@ -139,27 +139,27 @@ pub enum Screen<'a> {
     },
     /// It is none of those known.
     Unknown {
-        /// What it is most like.
+        /// Most similar textures.
         like: Vec<Row<'a>, LEADING>,
     },
-    /// Whether it is the texture that it was compared with.
+    /// Result of a comparison with one texture.
     Compared {
         /// That texture.
         name: &'a str,
-        /// Whether it is; `None`: not sure.
+        /// True if it is; `None`: not sure.
         same: Option<bool>,
-        /// Another slide may tell.
+        /// Another slide may decide.
         open: bool,
         /// From how many slides that texture was learned.
         trials: u8,
     },
-    /// What is it? And other lists.
+    /// A list: the texture's name, and others.
     Choose {
-        /// What is chosen.
+        /// Subject of the choice.
         title: &'a str,
-        /// Which is chosen.
+        /// Index of the chosen entry.
         at: u16,
-        /// How many there are.
+        /// Number of entries.
         count: u16,
         /// Those about it.
         entries: Vec<Entry<'a>, LINES>,
@@ -173,15 +173,15 @@ pub enum Screen<'a> {
     },
     /// The table is written.
     Saving,
-    /// What was learned, or why nothing was.
+    /// The name that was learned, or the reason why nothing was.
     Learned(Result<&'a Name, &'a str>),
-    /// What keeps the probe from working.
+    /// A trouble that keeps the probe from working.
     Fault(&'a Trouble),
     /// The probe.
     About(About),
-    /// The force was set by weights, or why not.
+    /// The force scale that was set by weights, or the reason why not.
     Calibrated(Result<ForceScale, &'a str>),
-    /// The accelerometer was turned over, or why it says nothing.
+    /// The scale of the accelerometer that was turned over, or the reason why not.
     Turned(Result<Turned, &'a str>),
     /// Nothing: the display is off.
     Dark,

@@ -1,11 +1,11 @@
-//! How fast the probe moves, from its sensor of motion, where it has one.
+//! Speed of the probe, from its sensor of motion, if it has one.
 
 use heapless::Deque;
 
 use crate::features::{Movement, fixed};
 use crate::sensor::paa5100je::COUNTS_PER_MM;
 
-/// Readings over which it is told whether the probe moves: 50 ms.
+/// Number of readings that show whether the probe moves: 50 ms.
 const LATEST: usize = 5;
 /// It moves when it has come so far within them, mm: 5 mm/s, the slowest movement that there is.
 const MOVES_MM: f32 = 0.25;
@@ -36,12 +36,12 @@ impl Speedometer {
         add(&mut self.counts, moved);
     }
 
-    /// Whether there is a sensor: a reading has come.
+    /// Returns true if there is a sensor: a reading has come.
     pub(super) fn is_there(&self) -> bool {
         !self.latest.is_empty()
     }
 
-    /// Whether the probe moves; `None` where that is not seen.
+    /// Returns true if the probe moves; `None` if the sensor does not see it.
     pub(super) fn moves(&self) -> Option<bool> {
         let mut counts = [0; 2];
         for moved in &self.latest {
@@ -62,13 +62,13 @@ impl Speedometer {
         self.before = self.counts;
     }
 
-    /// The way of the slide so far, mm; `None` where not all of it was seen.
+    /// The way of the slide so far, mm; `None` if a part of it was not seen.
     pub(super) fn way_mm(&self) -> Option<f32> {
         self.seen.then(|| way_mm(self.counts))
     }
 
-    /// ln of the mean speed of the steady part in parts of the movement's, 1/1024, if that took so many seconds; `None` where the
-    /// probe did not see all of the way.
+    /// ln of the mean speed of the steady part in parts of the movement's, 1/1024, if that took so many seconds; `None`
+    /// if the probe did not see all of the way.
     pub(super) fn pace(&self, seconds: f32, movement: Movement) -> Option<i16> {
         let [x, y] = self.counts;
         let [x0, y0] = self.before;
@@ -100,7 +100,7 @@ mod tests {
         let mut speed = Speedometer::default();
         assert_eq!(speed.pace(1.2, MOVEMENT), None, "nothing has begun");
         speed.begin();
-        // what comes before the steady part does not count
+        // the way before the steady part does not count
         speed.take(Some([0, -50]));
         speed.steady();
         (0..120).for_each(|_| speed.take(Some([0, -3])));

@@ -2,7 +2,7 @@
 
 use crate::table::Name;
 
-/// What can be taken: letters, then ends.
+/// The letters of the wheel; then its ends.
 const LETTERS: &str = "abcdefghijklmnopqrstuvwxyz 0123456789";
 /// Places on the wheel besides letters: done, rub out.
 const DONE: usize = 0;
@@ -13,14 +13,14 @@ const MOST: usize = 14;
 /// Places that are shown at once.
 pub const WHEEL: usize = 7;
 
-/// What a long press took.
+/// Result of a long press.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Taken {
     /// The name has changed.
     Letter,
     /// The name is this.
     Done(Name),
-    /// There is no name to be had.
+    /// There is no name.
     Back,
 }
 
@@ -29,7 +29,7 @@ pub(super) enum Taken {
 pub enum Place {
     /// The name ends.
     Done,
-    /// The last letter goes; without any, the spelling.
+    /// The last letter is deleted; without any, the spelling ends.
     Rub,
     /// A letter.
     Letter(char),
@@ -71,7 +71,7 @@ impl Spelling {
         &self.name
     }
 
-    /// The places about the one that a long press takes, which is in the middle.
+    /// The places of the wheel about the one that a long press takes, which is in the middle.
     pub(super) fn wheel(&self) -> [Place; WHEEL] {
         core::array::from_fn(|n| Self::place(self.at + Self::places() + n - WHEEL / 2))
     }

@@ -1,4 +1,4 @@
-//! What the probe is at: pages of the display, the button, the buzzer, and what is to be done with the table.
+//! State of the probe: pages of the display, the button, the buzzer, and the jobs on the table.
 
 use heapless::Vec;
 
@@ -17,7 +17,6 @@ use super::speed::Moved;
 use super::spelling::Spelling;
 use super::touch::Touch;
 use crate::dsp::Plan;
-use crate::explorer::Kernels;
 use crate::features::Observation;
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
@@ -28,18 +27,18 @@ use crate::table::{Name, Table};
 pub const TICKS_HZ: u32 = 100;
 /// Slides that a texture is learned from when the person began with training.
 const TRAINING_SLIDES: usize = 3;
-/// Textures that a verdict shows which further slides may change.
+/// Textures that a verdict shows if further slides may change it.
 const OPEN_ROWS: usize = 2;
-/// Nothing happens for this long: the display goes dark and the sensor rests, ticks.
+/// Idle time after which the display goes dark and the sensor rests, ticks.
 const DARK_AFTER: u32 = 60 * TICKS_HZ;
 /// "Again" is shown at least this long, ticks.
 const AGAIN: u32 = 3 * TICKS_HZ / 2;
-/// That something was learned is shown this long, ticks.
+/// Time for which a learned name is shown, ticks.
 const LEARNED: u32 = 3 * TICKS_HZ;
-/// No word for this long is a fault, ticks: the sensor needs 10 to start.
+/// Time without a word that is a fault, ticks: the sensor needs 10 to start.
 const NO_WORDS: u32 = 50;
 
-/// Something to be done with the table, by whoever owns it.
+/// A job on the table, for the task that owns it.
 #[derive(Clone, PartialEq, Debug)]
 #[allow(clippy::large_enum_variant)] // no allocation here, and only one at a time
 pub enum Job {
@@ -58,29 +57,29 @@ pub enum Job {
     TurnOver,
 }
 
-/// Which slide the host wants.
+/// The slide that the host wants.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Asked {
     /// Its number, from 1.
     pub slide: u8,
-    /// How many there can be; 0 is not known.
+    /// Largest number of slides; 0 if unknown.
     pub of: u8,
 }
 
-/// What came of it.
+/// The result of the host's request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Answer {
     /// The slide was made, and is good.
     Slid,
-    /// The person does not want to.
+    /// The person has declined.
     GivenUp,
-    /// Nobody has touched anything for a minute.
+    /// Nothing was touched for a minute.
     Nobody,
     /// Sensor or memory fail.
     Trouble,
 }
 
-/// A page of what happens on the display.
+/// A page of the display.
 #[derive(Clone, PartialEq, Debug)]
 enum Page {
     /// Nothing begun.
@@ -89,17 +88,17 @@ enum Page {
     Touching,
     /// The host's slide is made: the finger is to be lifted.
     Lift,
-    /// The host wants P_DC in the air.
+    /// The host requests P_DC in the air.
     Air,
-    /// The host wants P_DC under a weight of so many mN.
+    /// The host requests P_DC under a weight of so many mN.
     Weigh(u16),
-    /// The finger is to be turned over; it has been still the first way.
+    /// The finger is to be turned over; true if it has been still the first way.
     Turn(bool),
     /// A slide was no good; the slides before it stand.
     Again(Again),
     /// The job is being done.
     Thinking,
-    /// What was made of the slides: `judgement`.
+    /// The verdict of the slides: `judgement`.
     Verdict,
     /// An entry of a list.
     Choose(List, u16),
@@ -108,9 +107,9 @@ enum Page {
     Learned(Result<Name, &'static str>),
     Fault(Trouble),
     About,
-    /// The force was set, or why not.
+    /// The force scale, or the reason why not.
     Calibrated(Result<ForceScale, &'static str>),
-    /// It was turned over, or why not.
+    /// The scale of the accelerometer, or the reason why not.
     Turned(Result<Turned, &'static str>),
     Dark,
 }
@@ -119,8 +118,8 @@ enum Page {
 type Note = (u16, u8);
 
 /// The probe.
-pub struct Handheld<'p, K> {
-    touch: Touch<'p, K>,
+pub struct Handheld<'p> {
+    touch: Touch<'p>,
     button: Button,
     page: Page,
     /// Ticks since the page began, and since anything happened.
@@ -129,11 +128,11 @@ pub struct Handheld<'p, K> {
     silent: u32,
     /// The slides of this episode that were good.
     episode: Vec<Observation, MAX_SLIDES>,
-    /// What was made of them last.
+    /// Their last judgement.
     judgement: Option<Judgement>,
     /// The slides are for learning, not for identifying.
     training: bool,
-    /// They are compared with this texture only: is it that one?
+    /// The only texture to compare them with, if the person chose one.
     reference: Option<u16>,
     /// The go / no-go output is to be set.
     go: Option<bool>,
@@ -144,9 +143,9 @@ pub struct Handheld<'p, K> {
     job: Option<Job>,
     melody: &'static [Note],
     note: u8,
-    /// The page was changed and not looked at since.
+    /// The page was changed and not drawn since.
     fresh: bool,
-    /// What the host wants of the person, and what came of it.
+    /// The host's slide, and the result of its request.
     asked: Option<Asked>,
     answer: Option<Answer>,
 }
@@ -159,7 +158,7 @@ const SURE_IT_IS: &[Note] = &[(2000, 8), (2400, 8), (2700, 16)];
 const NOT_KNOWN: &[Note] = &[(1800, 10), (0, 4), (1400, 16)];
 const ALARM: &[Note] = &[(700, 30), (0, 10), (700, 30)];
 
-impl<'p, K: Kernels> Handheld<'p, K> {
+impl<'p> Handheld<'p> {
     /// A probe that was just switched on, with a table of so many textures.
     pub fn new(plan: &'p Plan, textures: u16) -> Self {
         Self {
@@ -206,19 +205,19 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.touch.lose(words);
     }
 
-    /// Ends what the host asked for.
+    /// Ends the host's request.
     fn end(&mut self, answer: Answer) {
         self.answer = Some(answer);
         self.asked = None;
         self.begin();
     }
 
-    /// Something to be done with the table; each is given once.
+    /// Takes the job on the table; each is given once.
     pub fn job(&mut self) -> Option<Job> {
         self.job.take()
     }
 
-    /// What came of [`Job::Judge`].
+    /// Takes the result of [`Job::Judge`].
     pub fn judged(&mut self, judged: Result<Judgement, JudgeError>) {
         if !matches!(self.page, Page::Thinking) {
             return;
@@ -265,7 +264,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.show(Page::Verdict);
     }
 
-    /// The next slides are compared with this texture.
+    /// Compares the next slides with this texture.
     fn compare(&mut self, reference: u16) {
         self.clear_episode();
         self.reference = Some(reference);
@@ -273,12 +272,13 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.show(Page::Touching);
     }
 
-    /// How the go / no-go output is to be set, once: on where it is the same, and off when the next comparison begins.
+    /// Takes the new level of the go / no-go output: on where it is the same, and off when the next comparison begins.
     pub fn go(&mut self) -> Option<bool> {
         self.go.take()
     }
 
-    /// The result of [`Job::Teach`]: the name that was learned, or why none was. The table now has `textures` textures.
+    /// Takes the result of [`Job::Teach`]: the name that was learned, or the reason why none was. The table now has
+    /// `textures` textures.
     pub fn learned(&mut self, learned: Result<Name, &'static str>, textures: u16) {
         self.textures = textures;
         if !matches!(self.page, Page::Saving) {
@@ -293,7 +293,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.fail(Trouble::Memory(why));
     }
 
-    /// Whether the sensor's words are wanted.
+    /// Returns true if the sensor's words are wanted.
     pub fn listens(&self) -> bool {
         match &self.page {
             Page::Ready
@@ -318,18 +318,18 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    /// Whether the finger is on something.
+    /// Returns true if the finger is on something.
     pub fn is_touched(&self) -> bool {
         self.touch.is_down()
     }
 
-    /// What the buzzer sounds now, Hz.
+    /// Tone of the buzzer, Hz.
     pub fn tone(&self) -> Option<u16> {
         let (hz, _) = self.melody.first()?;
         (*hz > 0).then_some(*hz)
     }
 
-    /// Whether the display is to be drawn anew since this was asked last.
+    /// Returns true if the display has changed since the last call.
     pub fn is_new(&mut self) -> bool {
         let moves = matches!(
             self.page,
@@ -338,17 +338,17 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         core::mem::take(&mut self.fresh) || moves
     }
 
-    /// How many textures the table has.
+    /// Number of textures in the table.
     pub fn textures(&self) -> u16 {
         self.textures
     }
 
-    /// Whether the display names textures, so that [`Handheld::screen`] needs the table.
+    /// Returns true if the display names textures, so that [`Handheld::screen`] needs the table.
     pub fn names_textures(&self) -> bool {
         matches!(self.page, Page::Verdict | Page::Choose(..))
     }
 
-    /// What the display shows.
+    /// The screen to draw.
     pub fn screen<'s>(&'s self, table: Option<&Table<'s>>, about: &About) -> Screen<'s> {
         let name = |texture: u16| table.and_then(|table| table.name(texture)).unwrap_or("?");
         let rows = |judgement: &Judgement| {
@@ -516,7 +516,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
                     self.show(Page::Touching);
                 }
                 Page::Verdict => match self.reference {
-                    // another sample, and the same question
+                    // another sample, compared with the same texture
                     Some(reference) => self.compare(reference),
                     None => {
                         self.clear_episode();

@@ -1,7 +1,8 @@
-//! One touch by hand, from its sensor words: when the finger is pressed well, when it slides, and whether the slide is good.
+//! One touch by hand, from its sensor words: the moments at which the finger is pressed well and slides, and the
+//! quality of the slide.
 //!
-//! A slide has begun when P_AC is livelier than that of the still finger, or, of a probe with a sensor of motion, when that sees it
-//! move; its steady part has a fixed length, and must last to its end at about the same force and pace.
+//! A slide has begun when P_AC is livelier than that of the still finger, or, of a probe with a sensor of motion, when
+//! that sees it move; its steady part has a fixed length, and must last to its end at about the same force and pace.
 
 use heapless::{Deque, Vec};
 
@@ -9,7 +10,6 @@ use super::guidance::{Again, Event, Phase, View, Way, ZONE_MN};
 use super::judge::MOVEMENT;
 use super::speed::{Moved, Speedometer};
 use crate::dsp::Plan;
-use crate::explorer::Kernels;
 use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
@@ -22,7 +22,7 @@ const BLOCKS_HZ: u16 = (RATE_HZ as usize / LOOK) as u16;
 const DOWN_MN: f32 = 100.0;
 /// ... and up below this one.
 const UP_MN: f32 = 60.0;
-/// Nobody means to press this hard, mN: the relation of P_DC and force bends at 2 N.
+/// Force above any intended press, mN: the relation of P_DC and force bends at 2 N.
 const MOST_MN: f32 = 1500.0;
 /// Blocks over which the force is taken: 100 ms, a tremor's period.
 const STEADY_FORCE: usize = 10;
@@ -54,12 +54,12 @@ const TENTHS: usize = STEADY as usize / LOOK / 10;
 /// Standard deviation of ln(liveliness) of the tenths from which a slide is too uneven.
 const UNEVEN: f32 = 0.8;
 
-/// Unreadable words in a row that mean that the sensor is silent: 100 ms.
+/// Unreadable words in a row that show that the sensor is silent: 100 ms.
 const SILENT: u16 = 440;
-/// Equal samples of P_AC in a row that mean that it hangs: 100 ms.
+/// Equal samples of P_AC in a row that show that it hangs: 100 ms.
 const FROZEN: u16 = 220;
 
-/// Samples of a touch as they came with the last word: what a slide is measured from.
+/// Samples of a touch as they came with the last word; a slide is measured from them.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Taken {
     /// Blocks of the touch that are full; a block of number 0 begins the touch anew.
@@ -69,12 +69,12 @@ pub struct Taken {
 }
 
 /// Follows touches.
-pub struct Touch<'p, K> {
+pub struct Touch<'p> {
     plan: &'p Plan,
     /// Contact force of one count of P_DC, mN.
     mn_per_count: f32,
     taken: Taken,
-    slide: Slide<'p, K>,
+    slide: Slide<'p>,
     blocks: Blocks,
     phase: Phase,
     /// Still blocks since the press, and the sum of their liveliness.
@@ -82,8 +82,8 @@ pub struct Touch<'p, K> {
     still_sum: f32,
     /// Blocks in a row that are livelier than the still ones; then the slide has begun.
     begins: u8,
-    /// Of the slide: liveliness of a still block before it, samples so far, blocks in a row as quiet as still ones, and the
-    /// sum of the liveliness of this tenth of a second.
+    /// Of the slide: liveliness of a still block before it, samples so far, blocks in a row as quiet as still ones, and
+    /// the sum of the liveliness of this tenth of a second.
     still_mean: f32,
     samples: u32,
     stopped: u8,
@@ -98,7 +98,7 @@ pub struct Touch<'p, K> {
     equal: u16,
     /// The last two samples of P_AC.
     before: [i16; 2],
-    /// P_DC in the air, and whole blocks that say so.
+    /// P_DC in the air, and the number of whole blocks in its mean.
     zero: f32,
     zeroed: u16,
     /// P_AC in the air: mean and liveliness.
@@ -106,7 +106,7 @@ pub struct Touch<'p, K> {
     air: f32,
     /// Mean P_DC of the latest blocks.
     forces: Deque<f32, STEADY_FORCE>,
-    /// Blocks in a row that say down, or up.
+    /// Blocks in a row that are down, or up.
     changes: u8,
     /// Still P_AC that is not yet old enough to be background.
     latest: Deque<[i16; LOOK], DELAY>,
@@ -114,7 +114,7 @@ pub struct Touch<'p, K> {
     speed: Speedometer,
 }
 
-impl<'p, K: Kernels> Touch<'p, K> {
+impl<'p> Touch<'p> {
     /// No slide yet.
     pub fn new(plan: &'p Plan) -> Self {
         Self {
@@ -150,7 +150,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         }
     }
 
-    /// Words come again after a pause: whatever was known is not so any more.
+    /// Begins anew after a pause without words: all knowledge of the touch is void.
     pub fn restart(&mut self) {
         *self = Self {
             mn_per_count: self.mn_per_count,
@@ -158,7 +158,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
         };
     }
 
-    /// From now on a count of P_DC means so many mN.
+    /// Sets the contact force of a count of P_DC, mN.
     pub fn calibrate(&mut self, mn_per_count: f32) {
         self.mn_per_count = mn_per_count;
     }
@@ -168,17 +168,17 @@ impl<'p, K: Kernels> Touch<'p, K> {
         self.speed.take(moved);
     }
 
-    /// Whether the probe moves; `None` where no sensor sees that.
+    /// Returns true if the probe moves; `None` if no sensor sees it.
     fn moves(&self) -> Option<bool> {
         self.speed.moves()
     }
 
     /// The slide that was good last, until the finger is pressed again.
-    pub fn slide(&self) -> &Slide<'p, K> {
+    pub fn slide(&self) -> &Slide<'p> {
         &self.slide
     }
 
-    /// What came with the last word.
+    /// Samples that came with the last word.
     pub fn taken(&self) -> &Taken {
         &self.taken
     }
@@ -195,17 +195,17 @@ impl<'p, K: Kernels> Touch<'p, K> {
         self.has_zero().then_some(self.zero)
     }
 
-    /// Whether P_DC in the air is known.
+    /// Returns true if P_DC in the air is known.
     pub fn has_zero(&self) -> bool {
         self.zeroed >= ZEROING
     }
 
-    /// Whether the finger is down.
+    /// Returns true if the finger is down.
     pub fn is_down(&self) -> bool {
         self.phase != Phase::Air
     }
 
-    /// As it is shown.
+    /// The view for the display.
     pub fn view(&self) -> View {
         let progress = match self.phase {
             Phase::Sliding => self.samples as f32 / (COMING_UP + STEADY) as f32,
@@ -299,8 +299,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
         (pdc - self.zero) * self.mn_per_count
     }
 
-    /// How lively P_AC is: mean square of its second difference. It takes the place of a filter: a tremor of 10 Hz comes
-    /// through by a millionth, a vibration of 200 Hz by a tenth.
+    /// Liveliness of P_AC: mean square of its second difference. It takes the place of a filter: a tremor of 10 Hz
+    /// comes through by a millionth, a vibration of 200 Hz by a tenth.
     fn lively(&mut self) -> f32 {
         let mut sum = 0;
         let [mut a, mut b] = self.before;
@@ -341,7 +341,7 @@ impl<'p, K: Kernels> Touch<'p, K> {
             _ if up => {
                 let slid = core::mem::replace(&mut self.phase, Phase::Air) == Phase::Sliding;
                 self.changes = 0;
-                // a slide that ends in the air was too short; that it is up is known by now
+                // a slide that ends in the air was too short; the finger is known to be up by now
                 Some(if slid {
                     Event::Again(Again::TooShort)
                 } else {
@@ -363,8 +363,8 @@ impl<'p, K: Kernels> Touch<'p, K> {
                 None
             }
             Phase::Slide => {
-                // the person was told to slide and may have begun: what was still before the gap is background enough, and
-                // nothing of a slide has been taken yet
+                // the person was asked to slide and may have begun: the still part before the gap is background enough,
+                // and no sample of a slide has been taken yet
                 self.latest.clear();
                 None
             }
@@ -559,12 +559,12 @@ impl<'p, K: Kernels> Touch<'p, K> {
         self.take(last);
         let seconds = STEADY as f32 / RATE_HZ as f32;
         self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
-        let mut slide = Slide::<K>::new(self.plan, MOVEMENT);
+        let mut slide = Slide::new(self.plan, MOVEMENT);
         slide.adopt(&self.slide);
         match slide.finish() {
             Ok(measurement) => Event::Slid(Observation::from(&measurement)),
             Err(SlideError::Silent) => Event::Frozen,
-            // all its samples are there: what is left is a gap
+            // all its samples are there: the remaining cause is a gap
             Err(_) => Event::Again(Again::Disturbed),
         }
     }

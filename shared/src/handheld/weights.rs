@@ -1,10 +1,9 @@
-//! A finger is calibrated without a computer, asked for on the display: known weights on it set the force, and an accelerometer is
-//! turned over.
+//! Calibration of a finger without a computer, prompted on the display: known weights on it set the force, and an
+//! accelerometer is turned over.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::by_hand::{ByHand, Hand};
-use crate::explorer::Kernels;
 use crate::probe::Memory;
 use crate::probe::calibrate::keep;
 use crate::probe::seams::{RigHandle, StoredBytes};
@@ -16,13 +15,13 @@ use crate::wire::Failure;
 
 /// Weights as a kitchen scale shows them, 30, 60, 90, 120 and 150 g, as forces in mN.
 pub const WEIGHTS_MN: [u16; 5] = [294, 588, 883, 1177, 1471];
-/// What the display says where the store fails.
+/// Text of the display if the store fails.
 const NOT_KEPT: &str = "Not kept. Restart it.";
-/// What the display says where P_DC falls under a weight.
+/// Text of the display if P_DC falls under a weight.
 const FALLS: &str = "P_DC falls. Swap the cell's wires.";
 
-impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
-    /// Asks for the finger in the air and for each of [`WEIGHTS_MN`] on it, keeps what comes of it, and shows that.
+impl<H: Hand> ByHand<'_, H> {
+    /// Asks for the finger in the air and for each of [`WEIGHTS_MN`] on it, keeps the result, and shows it.
     pub(super) async fn set_force<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
         memory: &mut Memory<'_, F, B>,
@@ -62,7 +61,7 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
         kept.then_some(scale).ok_or(Some(NOT_KEPT))
     }
 
-    /// Has the person turn the finger over, keeps what a count of acceleration is then, and shows that.
+    /// Asks the person to turn the finger over, keeps the value of a count of acceleration, and shows it.
     pub(super) async fn set_gravity<F: NorFlash, B: StoredBytes<F>>(
         &mut self,
         memory: &mut Memory<'_, F, B>,
@@ -95,7 +94,7 @@ impl<H: Hand, K: Kernels> ByHand<'_, H, K> {
     }
 }
 
-/// What the display says of it; nothing where the person gave up, or a fault is shown already.
+/// Text of the display for a failure; `None` if the person gave up, or a fault is shown already.
 fn words(why: &Failure) -> Option<&'static str> {
     match why {
         Failure::Rig(RigError::NobodyThere) => Some("Nothing was still."),

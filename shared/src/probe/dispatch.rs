@@ -9,7 +9,7 @@ use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
 use super::{calibrate, identify, teach, train, transfer};
 use crate::dsp::Plan;
-use crate::explorer::{Answer, Kernels};
+use crate::explorer::Answer;
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
 use crate::rig::turning::Turned;
@@ -119,8 +119,8 @@ where
     E: Events,
 {
     /// Does what was asked for, as [`turn`] had it queued, and says that it is done or why it is not.
-    pub async fn serve<K: Kernels>(&mut self, request: &Request) {
-        let done = self.perform::<K>(&request.command).await;
+    pub async fn serve(&mut self, request: &Request) {
+        let done = self.perform(&request.command).await;
         let id = request.id;
         self.events.tell(match done {
             Ok(()) => Event::Done(id),
@@ -132,7 +132,7 @@ where
     ///
     /// # Errors
     /// The reply: why it was not done.
-    pub async fn perform<K: Kernels>(&mut self, command: &Command) -> Result<(), Failure> {
+    pub async fn perform(&mut self, command: &Command) -> Result<(), Failure> {
         let Self {
             rig,
             memory,
@@ -164,7 +164,7 @@ where
                         }
                         events.tell(event);
                     };
-                    pin!(identify::<_, K>(wanted, config, rig, table, plan, tell)).await
+                    pin!(identify(wanted, config, rig, table, plan, tell)).await
                 };
                 memory.keep_skin(&rig.state().skin).await;
                 let episode = done?;
@@ -182,7 +182,7 @@ where
                 rig.begin(wanted.seed).await;
                 let (store, base, buffer) = memory.lend()?;
                 let tell = |event| events.tell(event);
-                let done = train::<_, _, K>(wanted, rig, store, base, plan, buffer, tell).await;
+                let done = train(wanted, rig, store, base, plan, buffer, tell).await;
                 memory.reload(events).await;
                 memory.keep_skin(&rig.state().skin).await;
                 done
@@ -206,7 +206,7 @@ where
                 Ok(calibrate::keep(memory.store()?, &calibration).await?)
             }
             Command::WriteCalibration(bytes) => {
-                if !matches!(bytes.len(), 60 | RigCalibration::BYTES) {
+                if bytes.len() != RigCalibration::BYTES {
                     return Err(Failure::CalibrationLength);
                 }
                 let calibration = RigCalibration::from_bytes(bytes)?;

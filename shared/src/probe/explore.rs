@@ -1,7 +1,7 @@
 //! An exploration: slide by slide, the explorer chooses, the rig moves, and the explorer takes in what was measured.
 
 use crate::dsp::Plan;
-use crate::explorer::{ExpectedOutcome, Explorer, Kernels, Verdict, Verification};
+use crate::explorer::{ExpectedOutcome, Explorer, Verdict, Verification};
 use crate::features::{Measurement, Slide};
 use crate::rig::{MAX_REJECTED, Rig, RigError};
 use crate::table::Action;
@@ -89,9 +89,9 @@ impl From<ExploreError<RigError>> for Failure {
 ///
 /// # Errors
 /// See [`ExploreError`].
-pub async fn explore<R: Rig, const N: usize, K: Kernels>(
+pub async fn explore<R: Rig, const N: usize>(
     rig: &mut R,
-    explorer: &mut Explorer<'_, N, K>,
+    explorer: &mut Explorer<'_, N>,
     plan: &Plan,
     random: impl FnMut() -> u32,
     mut tell: impl FnMut(ExplorationStep<'_, R::Error>),
@@ -118,9 +118,9 @@ pub async fn explore<R: Rig, const N: usize, K: Kernels>(
 }
 
 /// As [`explore`]; after the last slide the finger may still be on its way up.
-async fn slides<R: Rig, const N: usize, K: Kernels>(
+async fn slides<R: Rig, const N: usize>(
     rig: &mut R,
-    explorer: &mut Explorer<'_, N, K>,
+    explorer: &mut Explorer<'_, N>,
     plan: &Plan,
     mut random: impl FnMut() -> u32,
     tell: &mut impl FnMut(ExplorationStep<'_, R::Error>),
@@ -144,7 +144,7 @@ async fn slides<R: Rig, const N: usize, K: Kernels>(
             .table()
             .movement(action.movement)
             .ok_or(ExploreError::Movement(action.movement))?;
-        let mut slide = Slide::<K>::new(plan, movement);
+        let mut slide = Slide::new(plan, movement);
         let made = match rig.lifted().await {
             Ok(()) => early::perform(rig, explorer, action, &mut slide).await,
             Err(failed) => Err(failed),

@@ -5,9 +5,7 @@ use heapless::Vec;
 
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::{
-    self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, Kernels,
-};
+use crate::explorer::{self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError};
 use crate::rig::{Rig, RigError};
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
@@ -19,7 +17,7 @@ use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 ///
 /// # Errors
 /// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
-pub async fn identify<R, K>(
+pub async fn identify<R>(
     wanted: &Identify,
     config: Config,
     rig: &mut R,
@@ -29,7 +27,6 @@ pub async fn identify<R, K>(
 ) -> Result<EpisodeSummary, Failure>
 where
     R: Rig<Error = RigError>,
-    K: Kernels,
 {
     let contents = table.contents();
     if config.verify {
@@ -40,7 +37,7 @@ where
             return Err(Failure::NoLimits);
         }
     }
-    let mut explorer = Explorer::<'_, MAX_TEXTURES, K>::empty(table);
+    let mut explorer = Explorer::<'_, MAX_TEXTURES>::empty(table);
     let candidates = candidates(&wanted.among, table.textures());
     explorer
         .consider(rig.measures(), config, candidates)
@@ -65,9 +62,6 @@ where
             }
             ExplorationStep::Early(ms) => tell(Event::Early(ms)),
             ExplorationStep::Measured(action, measurement, posterior) => {
-                if let Some(pace) = measurement.pace {
-                    tell(Event::Pace(pace));
-                }
                 tell(Event::SlideReport {
                     slide,
                     action,

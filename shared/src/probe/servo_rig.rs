@@ -8,7 +8,6 @@ use super::calibrate;
 use super::explore::Random;
 use super::seams::{RigHandle, UnloadedRun};
 use super::status::RigState;
-use crate::dsp::Kernels;
 use crate::features::{Block, Blocks, Movement, PropertySet, SamplePhase, Slide};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::control::Control;
@@ -450,14 +449,14 @@ impl<S: Servo> Rig for ServoRig<S> {
         most_mn(self.servo.state().high_force)
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), RigError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), RigError> {
         self.perform_until(slide, &mut |_| false).await
     }
 
-    async fn perform_until<K: Kernels>(
+    async fn perform_until(
         &mut self,
-        slide: &mut Slide<'_, K>,
-        enough: Enough<'_, K>,
+        slide: &mut Slide<'_>,
+        enough: Enough<'_>,
     ) -> Result<(), RigError> {
         if self.servo.state().phase == Phase::Parked {
             self.home().await?;

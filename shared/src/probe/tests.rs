@@ -5,7 +5,7 @@ mod dispatch;
 use super::explore::Random;
 use super::identify::best;
 use super::*;
-use crate::dsp::{Kernels, Plan};
+use crate::dsp::Plan;
 use crate::explorer::{ExpectedOutcome, Method};
 use crate::features::{Block, FeatureSet, Movement, Observation, Property, PropertySet, Slide};
 use crate::rig::{Rig, RigError};
@@ -29,7 +29,7 @@ impl Rig for Script {
         [Property::Traction].into_iter().collect()
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error> {
         let Some(traction) = self.0.pop_front().ok_or(RigError::Hangs)? else {
             return Ok(());
         };
@@ -64,7 +64,7 @@ fn wanted(among: &[u16]) -> Identify {
 fn identified(slides: &[Option<i16>], wanted: &Identify) -> (Result<(), Text>, vec::Vec<String>) {
     let bytes = table();
     let mut told = vec::Vec::new();
-    let result = block_on(identify::<_, crate::dsp::Plain>(
+    let result = block_on(identify(
         wanted,
         wanted.config(Table::read(&bytes).unwrap().contents()),
         &mut Script(slides.iter().copied().collect()),
@@ -121,7 +121,7 @@ fn of_a_pair_only_one_can_be_the_answer() {
 fn what_goes_wrong_is_said() {
     assert_eq!(
         identified(&[], &wanted(&[])).0.unwrap_err(),
-        "the rig does not come to an end: home it"
+        "the movement does not end: home the rig"
     );
     let error = identified(&[], &wanted(&[7])).0.unwrap_err();
     assert!(error.contains("not textures of the table"), "{error}");
@@ -146,7 +146,7 @@ fn random_numbers_are_spread() {
 fn fused_table() -> vec::Vec<u8> {
     let bands = {
         let plan = Plan::new();
-        let mut slide = Slide::<crate::dsp::Plain>::new(&plan, Movement::FOR_TRACTION);
+        let mut slide = Slide::new(&plan, Movement::FOR_TRACTION);
         block_on(Script([Some(0)].into()).perform(&mut slide)).unwrap();
         Observation::from(&slide.finish().unwrap()).bands
     };
@@ -174,7 +174,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
             open,
             ..wanted(&[])
         };
-        let episode = block_on(identify::<_, crate::dsp::Plain>(
+        let episode = block_on(identify(
             &wanted,
             wanted.config(Table::read(&bytes).unwrap().contents()),
             &mut Script(slides.iter().copied().collect()),
@@ -267,7 +267,7 @@ fn training_a_fused_texture_ends_in_the_store() {
         let mut rig = Script([None, Some(tractions[0]), Some(tractions[1])].into());
         let mut buffer = vec![0; 8192];
         let mut told = vec::Vec::new();
-        block_on(train::<_, _, crate::dsp::Plain>(
+        block_on(train(
             &wanted,
             &mut rig,
             &mut store,

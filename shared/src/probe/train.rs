@@ -6,7 +6,6 @@ use heapless::Vec;
 use super::teach::delete_stale;
 use super::training::{Training, Wanted};
 use crate::dsp::Plan;
-use crate::explorer::Kernels;
 use crate::features::{Movement, Observation, Slide};
 use crate::rig::{MAX_REJECTED, Refused, Rig, RigError};
 use crate::store::Store;
@@ -21,7 +20,7 @@ use crate::wire::{Event, Failure, Rejection, Train};
 /// The texture cannot be learned, see [`crate::wire::TrainingError`]; the rig does not press as hard as one of the movements;
 /// the rig or the store failed;
 /// [`MAX_REJECTED`] slides in a row were no good.
-pub async fn train<R, F, K>(
+pub async fn train<R, F>(
     wanted: &Train,
     rig: &mut R,
     store: &mut Store<F>,
@@ -33,7 +32,6 @@ pub async fn train<R, F, K>(
 where
     R: Rig<Error = RigError>,
     F: NorFlash,
-    K: Kernels,
 {
     let name = wanted.name.as_str();
     let mut training = Training::new(
@@ -62,7 +60,7 @@ where
     }
     let mut rejected = 0;
     while let Some(movement) = training.next() {
-        let mut slide = Slide::<K>::new(plan, movement);
+        let mut slide = Slide::new(plan, movement);
         let made = match rig.perform(&mut slide).await {
             Ok(()) => rig.lifted().await,
             failed => failed,

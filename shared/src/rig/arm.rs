@@ -1,35 +1,36 @@
-//! What a probe and an arm that moves its finger say to each other. The probe gives one [`ArmOrder`] after the other; while one is
-//! open, the arm says at least every [`ARM_SAYS_MS`] how far it has come: [`ArmReport`]. Both may be said twice and mean the same.
+//! The messages between the probe and an arm that moves its finger. The probe gives one [`ArmOrder`] after the other;
+//! while one is open, the arm sends its progress, an [`ArmReport`], at least every [`ARM_SAYS_MS`]. Either message may
+//! be repeated without effect.
 
 use serde::{Deserialize, Serialize};
 
-/// An arm that works on an order says so at least this often, ms.
+/// Longest interval between two reports of an arm that works on an order, ms.
 pub const ARM_SAYS_MS: u32 = 100;
 /// Fastest that an arm comes down on a sample, um/s.
 ///
-/// The guard sees the force within 10 ms, its word takes up to 50 ms to an arm that stands 50 ms later: it has come down 0.11 mm
-/// farther then.
+/// The guard sees the force within 10 ms, its order takes up to 50 ms to the arm, which stands 50 ms later: by then it
+/// has come down 0.11 mm farther.
 pub const APPROACH_UM_S: u32 = 1000;
 
-/// What the arm is to do. A new order takes the place of the one before it.
+/// One task for the arm. A new order replaces the one before it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct ArmOrder {
-    /// Comes back in every report about it. The same number again is the same order.
+    /// Number of the order; every report about it carries the same. A repeated number is the same order.
     pub number: u16,
-    /// What.
+    /// The task.
     pub task: ArmTask,
 }
 
-/// What an arm can be asked for.
+/// The tasks of an arm.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum ArmTask {
-    /// To press the finger on the sample where the slide begins, and to hold it still. The movement's slide follows.
+    /// Presses the finger on the sample where the slide begins, and holds it still. The movement's slide follows.
     Press(ArmMovement),
-    /// To make the slide of that movement, and to stand again.
+    /// Makes the slide of that movement, and stands again.
     Slide,
-    /// To lift the finger off the sample, and to hold it still in the air.
+    /// Lifts the finger off the sample, and holds it still in the air.
     Lift,
-    /// To stand at once, whatever it does, then to lift the finger straight off the sample.
+    /// Stands at once, then lifts the finger straight off the sample.
     Stop,
 }
 
@@ -42,25 +43,25 @@ pub struct ArmMovement {
     pub speed_um_s: u32,
     /// Length of the slide at constant speed, um; the ramps come before and behind it.
     pub length_um: u32,
-    /// Where the slide begins: thousandths of the room that the sample leaves it.
+    /// Place where the slide begins: thousandths of the length that the sample leaves it.
     pub start: u16,
     /// Fastest that the finger may come down on the sample, um/s.
     pub approach_um_s: u32,
 }
 
-/// How far an arm has come with an order.
+/// Progress of an arm with an order.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct ArmReport {
-    /// Of the order.
+    /// Number of the order.
     pub number: u16,
-    /// How far.
+    /// The progress.
     pub state: ArmState,
 }
 
-/// How far an arm has come.
+/// Progress of an arm with an order.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum ArmState {
-    /// It is at it.
+    /// The arm works on it.
     Busy,
     /// The finger presses, and stands.
     Pressed,
@@ -68,31 +69,31 @@ pub enum ArmState {
     Steady,
     /// The slide is over, and the arm stands.
     Slid {
-        /// How long it was at constant speed, um.
+        /// Length at constant speed, um.
         length_um: u32,
-        /// How fast it was there, um/s.
+        /// Speed there, um/s.
         speed_um_s: u32,
     },
     /// The finger is in the air, and the arm stands.
     Lifted,
-    /// It cannot, or did not.
+    /// The arm cannot carry it out, or did not.
     Failed,
 }
 
-/// The order that is open, and when something was said about it.
+/// The open order, and the time of the last message about it.
 #[derive(Clone, Debug)]
 pub(super) struct Orders {
     order: ArmOrder,
-    /// Since it was given last, ms; none that the arm need not be told again.
+    /// Time since it was last sent, ms; `None` if it need not be repeated.
     said_ms: Option<u32>,
     heard_ms: u32,
 }
 
 impl Orders {
-    /// Ms until an order that nobody has heard is said again.
+    /// Time after which an order without a report is repeated, ms.
     const AGAIN_MS: u32 = 100;
 
-    /// An arm is told to stop: nobody knows what it does.
+    /// Orders an arm to stop: its state is unknown.
     pub(super) fn new(number: u16) -> Self {
         Self {
             order: ArmOrder {
@@ -116,25 +117,25 @@ impl Orders {
         };
     }
 
-    /// How far the arm is, if this is about the order that is open.
+    /// Returns the arm's progress if the report is about the open order.
     pub(super) fn hear(&mut self, report: ArmReport) -> Option<ArmState> {
         if report.number != self.order.number {
             return None;
         }
         self.heard_ms = 0;
-        // a stop is said until it is done
+        // a stop is repeated until it is done
         if self.order.task != ArmTask::Stop || report.state == ArmState::Lifted {
             self.said_ms = None;
         }
         Some(report.state)
     }
 
-    /// Nothing is to be said any more.
+    /// Ends the repeating of the order.
     pub(super) fn close(&mut self) {
         self.said_ms = None;
     }
 
-    /// A millisecond: the order, if it is to be said now.
+    /// A millisecond passes: returns the order if it is due to be sent.
     pub(super) fn tick(&mut self) -> Option<ArmOrder> {
         self.heard_ms = self.heard_ms.saturating_add(1);
         let said_ms = self.said_ms.as_mut()?;
@@ -146,7 +147,7 @@ impl Orders {
         Some(self.order)
     }
 
-    /// For how many ms the arm has said nothing about it.
+    /// Time since the arm's last report about it, ms.
     pub(super) fn silent_ms(&self) -> u32 {
         self.heard_ms
     }

@@ -1,28 +1,29 @@
-//! Whether a lever that is to go up does, and one that is up stays there: P_DC may fall meanwhile, and not rise.
+//! Check that a lever on its way up rises, and that a lifted finger stays up: P_DC may fall meanwhile, and not rise.
 
 use super::fault::Fault;
 use super::force::ForceMeter;
 use super::phase::Phase;
 use crate::sensor::FingerModel;
 
-/// P_DC of a finger in the air is no further than this from what its calibration says, mN: 40 counts of a BioTac, between its
-/// drift with temperature and the 110 of a contact that is pressed (chosen). What it lets pass, and 1.26 N on top, are below
-/// the guard's limit.
+/// P_DC of a finger in the air is no further than this from its calibrated value, mN: 40 counts of a BioTac, between
+/// its drift with temperature and the 110 of a contact that is pressed (chosen). A contact that passes this check and
+/// 1.26 N on top of it stay below the guard's limit.
 const AIR_MN: f32 = 460.0;
 /// A driver that steps on its own stops without current; only then the finger is lifted.
 pub(super) const RELEASE_MS: u32 = 20;
-/// P_DC that has risen by so much on the way up, mN, says that something presses: the lever, if it goes down.
+/// Rise of P_DC on the way up, mN, that shows that something presses: the lever, if it goes down.
 const RISEN_MN: f32 = 92.0;
-/// The same of a pressed finger that is lifted, whose stage may still be braking, mN: 20 counts of a BioTac, and 1.26 N with them are far
-/// below the guard's limit, which a lever that goes down at the speed of lifting overshoots by up to 0.15 N.
+/// The same of a pressed finger that is lifted, whose stage may still be braking, mN: 20 counts of a BioTac, and 1.26 N
+/// with them are far below the guard's limit, which a lever that goes down at the speed of lifting overshoots by up to
+/// 0.15 N.
 const LIFTED_RISEN_MN: f32 = 230.0;
-/// A finger that waits in the air may warm up: what it says there follows so many mN a millisecond, 30 counts of a BioTac a
-/// minute (chosen). Somebody may touch it, too: only [`AIR_MN`] more say that the lever has come down.
+/// P_DC of a finger that waits in the air may drift by so many mN a millisecond as it warms up: 30 counts of a BioTac a
+/// minute (chosen). A person may touch it, too: only [`AIR_MN`] more show that the lever has come down.
 const WARMING_MN: f32 = 0.00575;
-/// The same of a finger that was pressed too hard, since its driver was off: there every tenth of a newton counts.
+/// The same of a finger that was pressed too hard and whose driver is off: there every tenth of a newton counts.
 const WORSE_MN: f32 = 46.0;
 
-/// Whether P_DC at `counts` is none of such a finger that says `air` in the air.
+/// Returns true if P_DC at `counts` is implausible for this finger in the air, where it reads `air`.
 pub(super) fn is_far(finger: &FingerModel, counts: Option<f32>, air: f32) -> bool {
     counts.is_some_and(|counts| libm::fabsf(counts - air) > finger.counts(AIR_MN))
 }
@@ -33,18 +34,18 @@ pub(super) struct Ascent {
     finger: &'static FingerModel,
     /// The least mean since the lever began to look for its switch, or without contact at the last press, counts.
     lowest: Option<f32>,
-    /// That is kept: the finger was pressed too hard since lever and stage were home, and may be so still.
+    /// The finger was pressed too hard since lever and stage were home, and may be so still.
     pressed: bool,
     /// A weight of so many mN may come to lie on the finger while it waits.
     weight_mn: f32,
-    /// The finger cannot be lifted: the lever's driver stays off.
+    /// True if the finger cannot be lifted: the lever's driver stays off.
     pub(super) gave_up: bool,
     /// P_DC above no contact when the driver of a finger that was pressed too hard had been off for [`RELEASE_MS`].
     released: f32,
 }
 
 impl Ascent {
-    /// Of such a finger, of whose P_DC nothing is known.
+    /// A state for such a finger, without any knowledge of its P_DC.
     pub(super) fn new(finger: &'static FingerModel) -> Self {
         Self {
             finger,
@@ -56,14 +57,14 @@ impl Ascent {
         }
     }
 
-    /// Another finger, or another calibration: nothing is known of P_DC.
+    /// Forgets P_DC: the finger or its calibration is another.
     pub(super) fn forget(&mut self) {
         (self.lowest, self.pressed) = (None, false);
     }
 
-    /// The lever begins to look for its switch, at P_DC of `mean`; whether what was known of P_DC without contact is to be found anew.
-    /// After a press it is not: each try would begin where the last one ended. But where P_DC is what the calibration measured in
-    /// the `air`, nothing presses: what had seemed so was noise, or somebody has freed the finger.
+    /// The lever begins to look for its switch, at P_DC of `mean`. Returns true if P_DC without contact must be found
+    /// again. After a press it is not: each try would begin where the last one ended. But where P_DC is the value that
+    /// the calibration measured in the `air`, nothing presses: the rise was noise, or a person has freed the finger.
     pub(super) fn begin(&mut self, mean: Option<f32>, air: Option<f32>) -> bool {
         let is_free = mean
             .zip(air)
@@ -80,13 +81,13 @@ impl Ascent {
         self.lowest = mean.or(self.lowest);
     }
 
-    /// So many mN more may come to lie on the finger, for as long as it waits.
+    /// A weight of so many mN may be laid on the finger while it waits.
     pub(super) fn expect(&mut self, mn: u16) {
         self.weight_mn = f32::from(mn);
     }
 
-    /// A millisecond of `phase`, its `ms`-th, with a lever that `seeks` its switch or a stage that does not know its place: the
-    /// fault, if P_DC has risen on the way to the switch, or while the finger is to stay lifted.
+    /// A millisecond of `phase`, its `ms`-th, with a lever that `seeks` its switch or a stage that does not know its
+    /// place. Returns the fault if P_DC has risen on the way to the switch, or while the finger is to stay lifted.
     #[inline(never)]
     pub(super) fn tick(
         &mut self,
@@ -114,8 +115,8 @@ impl Ascent {
                 self.lift(ms, meter);
                 None
             }
-            // a switch that was closed on the way does not say when the finger is up, nor do steps, nor that nothing was felt where
-            // the sample should be: P_DC says when it is not
+            // a switch that was closed on the way does not show that the finger is up; nor do steps, nor a missing
+            // contact where the sample should be: P_DC shows when it is not
             Phase::Faulted(Fault::LeverLimit | Fault::NoContact | Fault::PressureDead) => {
                 if ms <= 1 && !self.pressed {
                     self.set_out(meter.mean());
@@ -139,8 +140,8 @@ impl Ascent {
         }
     }
 
-    /// P_DC on the way, mean of 10 ms: the fault, if it has risen by more than `mn`. The first time somebody may lean on
-    /// the finger, and it is lifted; then no further try makes a step before P_DC has fallen again.
+    /// P_DC on the way, mean of 10 ms. Returns the fault if it has risen by more than `mn`. The first time a person may
+    /// be leaning on the finger, and it is lifted; then no further try makes a step before P_DC has fallen again.
     #[inline(never)]
     fn rises(&mut self, mean: Option<f32>, mn: f32) -> Option<Fault> {
         let mean = mean?;
@@ -157,8 +158,8 @@ impl Ascent {
         })
     }
 
-    /// So long after it was seen that the finger is pressed too hard: gives up if lifting makes it worse, by a driver or a wire
-    /// that does not do what it is told.
+    /// So long after the finger was seen to be pressed too hard: gives up if lifting makes it worse, as with a driver
+    /// or a wire that does not obey.
     fn lift(&mut self, ms: u32, meter: &ForceMeter) {
         self.pressed = true;
         if ms <= RELEASE_MS {
@@ -168,7 +169,7 @@ impl Ascent {
         }
     }
 
-    /// P_DC without contact was measured, counts.
+    /// Takes P_DC without contact, counts.
     pub(super) fn zero(&mut self, counts: f32) {
         self.lowest = Some(counts);
     }
@@ -204,7 +205,7 @@ mod tests {
                 Some(Fault::LeverNotHome)
             );
         }
-        // somebody has freed it
+        // a person has freed it
         assert!(!ascent.begin(None, None));
         assert_eq!(ascent.rises(Some(2651.0), RISEN_MN), None);
         ascent.pressed = false;
@@ -280,7 +281,7 @@ mod tests {
             }
             seen
         };
-        // 24 counts a minute, for ten minutes; then somebody touches it
+        // 24 counts a minute, for ten minutes; then a person touches it
         assert_eq!(wait(&mut ascent, 600_000, 0.0004, 2600.0), None);
         assert_eq!(wait(&mut ascent, 1_000, 0.0, 2860.0), None);
         // a lever comes down: 45 counts a second

@@ -7,7 +7,7 @@ use super::turning;
 use crate::CRC32;
 use crate::sensor::pressure::{Calibration, CalibrationError};
 
-/// What was measured of one rig, on which day, and with which sensor.
+/// Measured constants of one rig, with their dates and the sensor they belong to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RigCalibration {
     /// Fingertip: zero and counts per newton.
@@ -16,14 +16,15 @@ pub struct RigCalibration {
     pub unloaded_a: (f32, f32),
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
-    /// Day on which the force per count was measured, as 20261121, [`RigCalibration::UNDATED`] where nobody knew the day, 0 if
-    /// it was not. Programs before version 7 of the messages dated every calibration: see [`RigCalibration::scale_day`].
+    /// Day on which the force per count was measured, as 20261121; [`RigCalibration::UNDATED`] if the day is unknown,
+    /// 0 if it was not measured.
     pub date: u32,
-    /// Whether P_DC in the air is this finger's, and no default.
+    /// True if P_DC in the air was measured with this finger and is no default.
     pub air_known: bool,
-    /// Day on which the accelerometer was turned over, and `pressure.pac_pa_per_count` with it measured, in mg; as `date`.
+    /// Day on which the accelerometer was turned over and `pressure.pac_pa_per_count` was measured with it, in mg;
+    /// format as `date`.
     pub turned: u32,
-    /// Serial number of the sensor, as the sensor says it.
+    /// Serial number of the sensor, as the sensor sends it.
     pub serial: [u8; 16],
 }
 
@@ -31,18 +32,15 @@ impl RigCalibration {
     /// The date of a calibration that a probe made without a computer: it has no clock.
     pub const UNDATED: u32 = 1;
 
-    /// Marks the stored date where it does not say whether P_DC in the air is known: of a date that programs before version 7
-    /// wrote, it is; of 0, it is not.
-    const OTHER_AIR: u32 = 1 << 31;
+    /// The bit of the stored date that says that P_DC in the air is known.
+    const AIR_KNOWN: u32 = 1 << 31;
 
-    /// Day on which the force per count was measured, see [`RigCalibration::date`]. The paper's own value was not, whatever the
-    /// date says.
+    /// Returns the day on which the force per count was measured, see [`RigCalibration::date`]; `None` if it was not.
     pub fn scale_day(&self) -> Option<u32> {
-        let is_papers = self.pressure.force_mn_per_count == Calibration::PAPER.force_mn_per_count;
-        (self.date != 0 && !is_papers).then_some(self.date)
+        (self.date != 0).then_some(self.date)
     }
 
-    /// This, with P_DC in the air as it was measured, counts.
+    /// The calibration with a measured P_DC in the air, counts.
     #[must_use]
     pub fn with_air(mut self, counts: f32) -> Self {
         self.pressure.pdc_no_contact = counts;
@@ -56,77 +54,67 @@ impl RigCalibration {
         (current_a - standstill - per_mm_s * speed_mm_s) * self.newton_per_ampere
     }
 
-    /// Most bytes of a stored record.
+    /// Bytes of a stored record.
     pub const BYTES: usize = 64;
 
-    /// The record as it is stored: nine f32, the date, the serial number, the day on which the accelerometer was turned over, if
-    /// it was, and a CRC-32 of these; little-endian. The highest bit of the date says whether P_DC in the air is known: set, if it is
-    /// without a date, or is not with one.
+    /// Returns the record as it is stored: nine f32, the date, the day on which the accelerometer was turned over, the
+    /// serial number, and a CRC-32 of these; little-endian. The highest bit of the date is set where P_DC in the air is
+    /// known.
     #[inline(never)]
     pub fn to_bytes(&self) -> Vec<u8, { Self::BYTES }> {
+        let air = if self.air_known { Self::AIR_KNOWN } else { 0 };
         let numbers = self.numbers().into_iter().flat_map(f32::to_le_bytes);
-        let other_air = self.air_known != (self.date != 0);
-        let date = self.date | if other_air { Self::OTHER_AIR } else { 0 };
-        let fields = numbers.chain(date.to_le_bytes()).chain(self.serial);
+        let days = [self.date | air, self.turned].into_iter();
+        let fields = numbers.chain(days.flat_map(u32::to_le_bytes));
         let mut bytes = Vec::new();
         // there is room for all of them
-        for byte in fields {
+        for byte in fields.chain(self.serial) {
             let _ = bytes.push(byte);
-        }
-        if self.turned != 0 {
-            let _ = bytes.extend_from_slice(&self.turned.to_le_bytes());
         }
         let _ = bytes.extend_from_slice(&CRC32.checksum(&bytes).to_le_bytes());
         bytes
     }
 
-    /// The record in `bytes`, checked.
+    /// Returns the record in `bytes`, checked.
     ///
     /// # Errors
-    /// [`RigCalibrationError::Damaged`], or what [`RigCalibration::check`] says.
+    /// [`RigCalibrationError::Damaged`], or the error of [`RigCalibration::check`].
     #[inline]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RigCalibrationError> {
-        let (body, crc) = bytes
-            .split_last_chunk::<4>()
-            .ok_or(RigCalibrationError::Damaged)?;
-        if CRC32.checksum(body) != u32::from_le_bytes(*crc) {
+        let whole: &[u8; Self::BYTES] =
+            bytes.try_into().map_err(|_| RigCalibrationError::Damaged)?;
+        let (words, _) = whole.as_chunks::<4>();
+        let (body, crc) = whole.split_at(Self::BYTES - 4);
+        if crc != CRC32.checksum(body).to_le_bytes() {
             return Err(RigCalibrationError::Damaged);
         }
-        let (numbers, rest) = body
-            .split_first_chunk::<{ 10 * 4 }>()
-            .ok_or(RigCalibrationError::Damaged)?;
-        let (serial, turned) = rest
-            .split_first_chunk::<16>()
-            .ok_or(RigCalibrationError::Damaged)?;
-        let turned = match turned {
-            [] => 0,
-            day => u32::from_le_bytes(day.try_into().map_err(|_| RigCalibrationError::Damaged)?),
+        let mut words = words.iter().copied();
+        let mut word = || words.next().unwrap_or_default();
+        let mut number = || f32::from_le_bytes(word());
+        let pressure = Calibration {
+            pac_pa_per_count: number(),
+            pac_rest: number(),
+            pdc_pa_per_count: number(),
+            pdc_no_contact: number(),
+            force_mn_per_count: number(),
+            linear_mn: number(),
         };
-        let mut words = numbers.as_chunks::<4>().0.iter();
-        let mut number = || {
-            words
-                .next()
-                .map_or(f32::NAN, |word| f32::from_le_bytes(*word))
-        };
-        let mut record = Self {
-            pressure: Calibration {
-                pac_pa_per_count: number(),
-                pac_rest: number(),
-                pdc_pa_per_count: number(),
-                pdc_no_contact: number(),
-                force_mn_per_count: number(),
-                linear_mn: number(),
-            },
-            unloaded_a: (number(), number()),
-            newton_per_ampere: number(),
-            date: words.next().map_or(0, |word| u32::from_le_bytes(*word)),
-            air_known: false,
+        let unloaded_a = (number(), number());
+        let newton_per_ampere = number();
+        let [date, turned] = [word(), word()].map(u32::from_le_bytes);
+        let mut serial = [0; 16];
+        for (to, from) in serial.iter_mut().zip(words.flatten()) {
+            *to = from;
+        }
+        let record = Self {
+            pressure,
+            unloaded_a,
+            newton_per_ampere,
+            date: date & !Self::AIR_KNOWN,
+            air_known: date & Self::AIR_KNOWN != 0,
             turned,
-            serial: *serial,
+            serial,
         };
-        let other_air = record.date & Self::OTHER_AIR != 0;
-        record.date &= !Self::OTHER_AIR;
-        record.air_known = other_air != (record.date != 0);
         record.check()?;
         Ok(record)
     }
@@ -147,7 +135,7 @@ impl RigCalibration {
         ]
     }
 
-    /// Checks a record before a motor is moved by it.
+    /// Checks a record before it moves a motor.
     ///
     /// # Errors
     /// See [`RigCalibrationError`].
@@ -172,7 +160,7 @@ impl RigCalibration {
     }
 }
 
-/// Why a calibration is not used.
+/// Reasons for refusing a calibration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum RigCalibrationError {
     /// The fingertip's constants.
@@ -190,7 +178,7 @@ pub enum RigCalibrationError {
     /// The points do not lie on a line: R^2 below 0.99.
     #[error("the points do not lie on a line (R^2 below 0.99): measure again")]
     NoLine,
-    /// What a count of an accelerometer is worth. New in version 10.
+    /// The value of an accelerometer's count.
     #[error("an accelerometer's count is within a tenth of 0.976 mg: turn the finger over again")]
     Turned,
 }
@@ -330,9 +318,6 @@ mod tests {
             turned: 20_261_126,
             ..rig
         };
-        // that of before version 10, but for an accelerometer that was turned over
-        assert_eq!(rig.to_bytes().len(), 60);
-        assert_eq!(turned.to_bytes().len(), RigCalibration::BYTES);
         assert_eq!(RigCalibration::from_bytes(&turned.to_bytes()), Ok(turned));
         for whole in [rig.to_bytes(), turned.to_bytes()] {
             for bit in 0..8 * whole.len() {
@@ -375,18 +360,8 @@ mod tests {
             RigCalibration::from_bytes(&nonsense),
             Err(RigCalibrationError::Current)
         );
-        // dated by a program that did not ask for a scale
-        assert_eq!(rig.scale_day(), None);
-        let weighed = Calibration {
-            force_mn_per_count: 11.4,
-            ..Calibration::PAPER
-        };
-        let weighed = RigCalibration {
-            pressure: weighed,
-            ..rig
-        };
-        assert_eq!(weighed.scale_day(), Some(20_261_121));
-        assert_eq!(RigCalibration { date: 0, ..weighed }.scale_day(), None);
+        assert_eq!(rig.scale_day(), Some(20_261_121));
+        assert_eq!(RigCalibration { date: 0, ..rig }.scale_day(), None);
         let pressure = Calibration {
             force_mn_per_count: -1.0,
             ..Calibration::PAPER

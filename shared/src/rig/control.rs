@@ -1,14 +1,14 @@
-//! One movement from beginning to end: position the stage, press, measure the still finger, slide, lift. [`Control`] joins
-//! lever, stage and guard, and is called once a millisecond.
+//! One movement from beginning to end: position the stage, press, measure the still finger, slide, lift. [`Control`]
+//! joins lever, stage and guard, and is called once a millisecond.
 //!
-//! It has no input or output of its own: [`Control::tick`] takes the state of the inputs and returns that of the outputs,
-//! so that board and simulator run the same code.
+//! It has no input or output of its own: [`Control::tick`] takes the state of the inputs and returns that of the
+//! outputs, so that board and simulator run the same code.
 
 use super::ascent::{Ascent, RELEASE_MS, is_far};
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{Guard, Seen, Switch, Unguarded, force_limit_mn, may_press};
+use super::guard::{Guard, GuardInputs, Switch, Unguarded, force_limit_mn, may_press};
 use super::lever::{Lever, LeverState};
 use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 use super::pins::{Inputs, Outputs};
@@ -18,7 +18,7 @@ use super::stage::{MARGIN_MM, Stage, StageConstants, StageState};
 use crate::features::Movement;
 use crate::sensor::{FingerModel, pressure::Channel};
 
-/// How long the still finger is measured.
+/// Time over which the still finger is measured, ms.
 pub const BACKGROUND_MS: u32 = 1000;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
@@ -26,9 +26,9 @@ const RETURN_MM_S: f32 = 50.0;
 const BEYOND_MM: f32 = 7.0;
 /// Slower than this the stage stands, mm/s.
 const STANDS_MM_S: f32 = 0.5;
-/// A lifted finger shows no more than this above its zero, mN.
+/// Largest P_DC above its zero that a lifted finger shows, mN.
 const LIFTED_MN: f32 = 92.0;
-/// By so much may the mean force of a slide differ from that of the still finger before it: mN, and a share.
+/// Largest difference between the mean force of a slide and that of the still finger before it: mN, and a share.
 const SLIDE_OFF: (f32, f32) = (34.5, 0.25);
 
 /// The whole rig.
@@ -46,11 +46,12 @@ pub struct Control {
     ended: Option<Ended>,
     run: Run,
     high_force: bool,
-    /// P_DC without contact was measured: before that only its rise says anything of a finger that nobody calibrated.
+    /// True once P_DC without contact was measured: before that only its rise tells anything about an uncalibrated
+    /// finger.
     zeroed: bool,
-    /// The first zero since homing was compared with the calibration's.
+    /// True once the first zero since homing was compared with the calibration's.
     compared: bool,
-    /// P_DC without contact before the fault that the rig gets over by itself: it must be found again.
+    /// P_DC without contact before the fault that the rig recovers from by itself: it must be found again.
     recovered: Option<f32>,
     /// P_DC in the air, mean of the last run without load.
     air: Option<f32>,
@@ -65,7 +66,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// A rig with such a finger that does not know where it is, with all guards but `unguarded`.
+    /// A rig with such a finger whose position is unknown, with all guards but `unguarded`.
     pub fn new(
         finger: &'static FingerModel,
         constants: StageConstants,
@@ -97,17 +98,17 @@ impl Control {
         }
     }
 
-    /// What the rig is doing.
+    /// The current phase.
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// How the last movement ended, told once.
+    /// Takes the end of the last movement; `None` the second time.
     pub fn take_ended(&mut self) -> Option<Ended> {
         self.ended.take()
     }
 
-    /// Contact force in mN as P_DC has it, mean over 10 ms.
+    /// Contact force in mN from P_DC, mean over 10 ms.
     pub fn force_mn(&self) -> f32 {
         self.meter.force_mn(&self.calibration.pressure)
     }
@@ -149,13 +150,13 @@ impl Control {
         Ok(())
     }
 
-    /// Allows forces up to 2 N, the last two rows of the grid of eq. 21, or forbids them. Where P_DC says too little the lever
-    /// presses on: for a rig whose finger yields before 2.2 N, or whose lever is stopped.
+    /// Allows forces up to 2 N, the last two rows of the grid of eq. 21, or forbids them. Where P_DC reads too low the
+    /// lever presses on: for a rig whose finger yields before 2.2 N, or whose lever is stopped.
     pub fn allow_high_force(&mut self, allow: bool) {
         self.high_force = allow;
     }
 
-    /// Whether forces up to 2 N are allowed.
+    /// Returns true if forces up to 2 N are allowed.
     pub fn high_force(&self) -> bool {
         self.high_force
     }
@@ -194,8 +195,8 @@ impl Control {
         }
     }
 
-    /// Ends a fault and homes without a person. There the finger must say what it said in the air before, within 40 counts:
-    /// one that has drifted, and would drift on, is [`Fault::LeverNotHome`].
+    /// Ends a fault and homes without a person. P_DC in the air must be within 40 counts of its value before: a finger
+    /// that has drifted further, and would drift on, is [`Fault::LeverNotHome`].
     ///
     /// # Errors
     /// As [`Control::reset`] and [`Control::home`].
@@ -208,7 +209,7 @@ impl Control {
         Ok(())
     }
 
-    /// Whether nobody has measured this finger's P_DC without contact: the default says nothing of it.
+    /// Returns true if this finger's P_DC without contact was never measured: the default says nothing about it.
     fn knows_only_default(&self) -> bool {
         !self.zeroed && !self.calibration.air_known
     }
@@ -219,18 +220,18 @@ impl Control {
         }
     }
 
-    /// Whether P_DC at `counts` cannot be that of this finger in the air.
+    /// Returns true if P_DC at `counts` is implausible for this finger in the air.
     #[inline(never)]
     fn is_pressed(&self, counts: Option<f32>) -> bool {
         let calibrated = self.calibration.pressure.pdc_no_contact;
         let calibrated = self.calibration.air_known.then_some(calibrated);
-        // of a finger that nobody has calibrated, what it said on its way up
+        // for a finger without calibration, its reading on the way up
         let known = [calibrated.or(self.ascent.lowest()), self.recovered];
         let mut known = known.into_iter().flatten();
         known.any(|air| is_far(self.finger, counts, air))
     }
 
-    /// Makes one movement, beginning at `start`: 0 to 1 of the room that the sample leaves.
+    /// Makes one movement, beginning at `start`: 0 to 1 of the length that the sample leaves.
     ///
     /// # Errors
     /// See [`Refused`].
@@ -274,7 +275,7 @@ impl Control {
                 self.ended = Some(Ended::Stopped);
                 self.enter(Phase::Lifting);
             }
-            // the lever goes on to its limit switch: that is what lifts the finger
+            // the lever continues to its limit switch: that lifts the finger
             Phase::Homing => {
                 self.stage.forget();
                 self.ended = Some(Ended::Stopped);
@@ -284,8 +285,8 @@ impl Control {
         }
     }
 
-    /// Ends the slide that is being made, if one is: the stage brakes as at its end, and what comes after is the same. All guards
-    /// watch on.
+    /// Ends the current slide, if there is one: the stage brakes as at its end, and the rest is the same. All guards
+    /// stay on.
     #[inline]
     pub fn end_slide(&mut self) {
         if self.phase == Phase::Sliding {
@@ -307,7 +308,7 @@ impl Control {
             self.guard.reset();
             self.stage.stop();
             if fault == Fault::LeverNotHome {
-                // it is somewhere else than its steps say, and may be moved by hand now
+                // its place differs from its steps, and it may be moved by hand now
                 self.lever.lose();
             } else {
                 self.lever.reset();
@@ -318,8 +319,9 @@ impl Control {
         Ok(())
     }
 
-    /// Whether nothing moves: ready, parked, or at the end of a fault; a finger that hangs goes up to its switch later. It is
-    /// lifted then, unless the fault is [`Fault::LeverNotHome`], or [`Fault::EStop`] and the motors had no supply.
+    /// Returns true if nothing moves: ready, parked, or at the end of a fault; a finger that hangs goes up to its
+    /// switch later. It is lifted then, unless the fault is [`Fault::LeverNotHome`], or [`Fault::EStop`] and the motors
+    /// had no supply.
     pub fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::Parked => true,
@@ -359,7 +361,7 @@ impl Control {
         let at_top = self.lever_top.tick(inputs.lever_top);
         let at_left = self.stage_left.tick(inputs.stage_limits.0);
         let seeks = self.lever.is_parking() || self.stage.state() == StageState::Unknown;
-        // where the lever has come to rest at its switch, P_DC that rises is a sensor that is mended or a hand, and no lever
+        // where the lever rests at its switch, a rise of P_DC is a sensor that was mended or a hand, and no lever
         let rests = matches!(self.phase, Phase::Faulted(_)) && self.lever.rests();
         let rise = (!rests).then(|| self.ascent.tick(self.phase, seeks, self.ms, &self.meter));
         let rise = rise.flatten();
@@ -391,7 +393,8 @@ impl Control {
             Phase::Faulted(fault) => {
                 // with its bridge on and no duty the motor is shorted, and brakes
                 outputs.stage_duty = 0.0;
-                // a driver that steps on its own must lose its current. Once lifted, nothing is to happen any more.
+                // a driver that steps on its own must lose its current. Once the finger is lifted, nothing more may
+                // happen.
                 let released = fault != Fault::ForceHigh || self.ms > RELEASE_MS;
                 outputs.lever_enabled = released && !self.is_at_rest();
                 if !outputs.lever_enabled {
@@ -405,8 +408,8 @@ impl Control {
         outputs
     }
 
-    /// A fault that lever or stage have found themselves. That the finger cannot be lifted is worse than what it was to be
-    /// lifted for.
+    /// A fault that lever or stage have found themselves. A finger that cannot be lifted is worse than the fault that
+    /// it was to be lifted for.
     #[inline]
     fn check(&mut self, fault: Fault) {
         if !self.guard.looks_for(fault) {
@@ -429,7 +432,7 @@ impl Control {
             StageState::Moving(profile) => profile.velocity_mm_s(),
             _ => 0.0,
         };
-        let seen = Seen {
+        let seen = GuardInputs {
             words: &inputs.words,
             e_stop: inputs.e_stop,
             hung: inputs.hung,
@@ -452,7 +455,7 @@ impl Control {
         let fault = self
             .guard
             .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn)?;
-        // a sensor that is switched off is no fault of a rig that does nothing; too much force always is
+        // a sensor that is switched off is no fault of an idle rig; too much force always is
         let idle = matches!(self.phase, Phase::Parked | Phase::Faulted(_));
         (!idle || (fault == Fault::ForceHigh && self.phase != Phase::Parked)).then_some(fault)
     }
@@ -474,7 +477,7 @@ impl Control {
                             if self.is_pressed(mean) {
                                 self.check(Fault::LeverNotHome);
                             }
-                            // before there are 10 ms of P_DC nothing is known; that they come is the guard's to see
+                            // before there are 10 ms of P_DC nothing is known; the guard sees to it that they come
                             let known = mean.is_some() || !self.calibration.air_known;
                             if known && self.phase == Phase::Homing {
                                 self.stage.home();
@@ -506,7 +509,7 @@ impl Control {
                     if self.lever.press(target) {
                         self.enter(Phase::Pressing);
                     } else {
-                        // it is not lifted, whatever it has done: now it will be
+                        // the finger is not lifted after all steps of the lever: now it will be
                         self.fail(Fault::LeverSlips);
                     }
                 }
@@ -573,7 +576,7 @@ impl Control {
             }
             Phase::Lifting => {
                 if self.lever.is_lifted() && libm::fabsf(self.stage.velocity_mm_s()) < STANDS_MM_S {
-                    // steps that were asked for and not made leave the finger down
+                    // steps that were commanded and not made leave the finger down
                     if self.meter.counts() > self.finger.counts(LIFTED_MN) {
                         self.check(Fault::LeverSlips);
                     } else if self.stage.state() == StageState::Unknown {

@@ -1,4 +1,4 @@
-//! Contact force from P_DC: a mean over 10 ms, and where that mean is going.
+//! Contact force from P_DC: a mean over 10 ms, and its slope.
 
 use crate::sensor::pressure::{Calibration, Counts, RATE_HZ};
 
@@ -12,7 +12,7 @@ const LAG_SAMPLES: f32 = (MEAN_SAMPLES - 1) as f32 / 2.0;
 #[derive(Clone, Debug)]
 pub struct ForceMeter {
     samples: [u16; KEPT],
-    /// Where the next sample goes.
+    /// Index of the next sample.
     next: usize,
     filled: usize,
     /// Sums of the newer and of the older half.
@@ -24,7 +24,7 @@ pub struct ForceMeter {
 }
 
 impl ForceMeter {
-    /// A meter that has seen nothing yet; `no_contact` counts mean no force.
+    /// An empty meter; `no_contact` counts mean no force.
     pub fn new(no_contact: f32) -> Self {
         Self {
             samples: [0; KEPT],
@@ -66,7 +66,7 @@ impl ForceMeter {
         self.long.1 = self.long.1.saturating_add(1);
     }
 
-    /// Whether a mean and its slope are known.
+    /// Returns true if a mean and its slope are known.
     fn is_full(&self) -> bool {
         self.filled >= KEPT
     }
@@ -86,7 +86,7 @@ impl ForceMeter {
         difference / MEAN_SAMPLES as f32 * RATE_HZ as f32 / MEAN_SAMPLES as f32
     }
 
-    /// P_DC counts above no contact at this moment: the mean, with its lag made up for.
+    /// P_DC counts above no contact at this moment: the mean, corrected for its lag.
     pub fn counts_now(&self) -> f32 {
         self.counts() + self.counts_per_s() * (LAG_SAMPLES / RATE_HZ as f32)
     }
@@ -113,7 +113,7 @@ impl ForceMeter {
         }
     }
 
-    /// From now on the lowest mean is the value of no contact: see [`ForceMeter::sink`].
+    /// Makes the lowest mean from now on the value of no contact: see [`ForceMeter::sink`].
     pub fn forget_zero(&mut self) {
         self.no_contact = f32::from(Counts::MAX.get());
     }
@@ -125,12 +125,12 @@ impl ForceMeter {
         }
     }
 
-    /// P_DC as it is, mean over the last 10 ms; `None` before there are 10 ms of samples.
+    /// Mean P_DC over the last 10 ms, counts; `None` before there are 10 ms of samples.
     pub fn mean(&self) -> Option<f32> {
         (self.filled >= MEAN_SAMPLES).then(|| self.newer as f32 / MEAN_SAMPLES as f32)
     }
 
-    /// P_DC as it is, mean since [`ForceMeter::begin_long`]; `None` before the first sample.
+    /// Mean P_DC since [`ForceMeter::begin_long`], counts; `None` before the first sample.
     pub fn long_mean(&self) -> Option<f32> {
         let (sum, samples) = self.long;
         // over ten minutes of samples fit; f64 keeps the fraction

@@ -1,4 +1,4 @@
-//! Notices every fault that can be seen from outside the lever and the stage: sensor, switches, stage and force.
+//! Detection of every fault that can be seen from outside the lever and the stage: sensor, switches, stage and force.
 
 use super::force::ForceMeter;
 use crate::sensor::FingerModel;
@@ -7,28 +7,28 @@ use crate::sensor::pressure::{Calibration, Pressure};
 use super::fault::Fault;
 use super::phase::{HIGH_FORCE_MN, most_mn};
 
-/// Force by P_DC at which the finger is lifted, mN, so that it never feels more than 2.2 N.
+/// Force by P_DC at which the finger is lifted, mN, so that it never bears more than 2.2 N.
 ///
-/// P_DC bends above 2 N, where the skin touches the core, and says less than there is (fig. 3); what silicone adds to a
-/// fast press it does not say at all. 2.05 N by P_DC are 2.07 to 2.13 N.
+/// P_DC bends above 2 N, where the skin touches the core, and reads too low (fig. 3); it does not show the part that
+/// silicone adds to a fast press. 2.05 N by P_DC are 2.07 to 2.13 N.
 pub const FORCE_LIMIT_MN: f32 = 2050.0;
-/// The same while a rig that was allowed to presses more than 1.26 N. Friction adds to P_DC, 3 % of the shear in the model:
-/// 2.1 N by P_DC are at most 2.18 N.
+/// The same while a rig that was allowed to presses more than 1.26 N. Friction adds to P_DC, 3 % of the shear in the
+/// model: 2.1 N by P_DC are at most 2.18 N.
 pub const HIGH_FORCE_LIMIT_MN: f32 = 2100.0;
 const SILENT_MS: u32 = 10;
 const FROZEN_MS: u32 = 100;
-/// The switch under a lever that stands there is open for so long when the lever has left it: contacts bounce, and the stage
-/// shakes them (chosen).
+/// The switch under a lever that stands there is open for so long when the lever has left it: contacts bounce, and the
+/// stage shakes them (chosen).
 const LEFT_MS: u32 = 20;
 const MOTION_MS: usize = 30;
-/// Damaged words in a second that are one too many.
+/// Number of damaged words in a second that is a fault.
 const MAX_DAMAGED: u32 = 22;
 /// Slices of that second.
 const SLICES: usize = 10;
 const SLICE_MS: u32 = 100;
 
-/// Force by P_DC at which the finger is lifted, mN: while a `high` force is pressed, or otherwise. A finger whose line ends
-/// before 2 N has the tolerance of the paper's.
+/// Force by P_DC at which the finger is lifted, mN: while a `high` force is pressed, or otherwise. A finger whose line
+/// ends before 2 N has the tolerance of the paper's.
 pub(super) fn force_limit_mn(finger: &Calibration, high: bool) -> f32 {
     let most_mn = if high {
         HIGH_FORCE_LIMIT_MN
@@ -38,7 +38,8 @@ pub(super) fn force_limit_mn(finger: &Calibration, high: bool) -> f32 {
     (finger.linear_mn * (most_mn / Calibration::PAPER.linear_mn)).min(most_mn)
 }
 
-/// Whether a rig that was allowed high forces, or was not, may press this finger of this model with so many mN.
+/// Returns true if a rig with or without permission for high forces may press this finger of this model with so many
+/// mN.
 pub(super) fn may_press(
     model: &FingerModel,
     finger: &Calibration,
@@ -52,7 +53,7 @@ pub(super) fn may_press(
         && counts.is_ok_and(|counts| force_mn <= HIGH_FORCE_MN || counts < most_counts)
 }
 
-/// Faults whose detection is switched off. For tests, which must see that a missing guard is noticed.
+/// Faults whose detection is switched off. For tests, which must notice a missing guard.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Unguarded(u32);
 
@@ -68,20 +69,20 @@ impl Unguarded {
         Self(self.0 | fault.bit())
     }
 
-    /// Whether `fault` is not looked for.
+    /// Returns true if `fault` is not looked for.
     pub const fn ignores(self, fault: Fault) -> bool {
         self.0 & fault.bit() != 0
     }
 }
 
-/// What the guard looks at every millisecond.
+/// The guard's inputs of one millisecond.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
+pub struct GuardInputs<'a> {
     /// Words since the last millisecond; `None` is a damaged one.
     pub words: &'a [Option<Pressure>],
     /// The emergency stop.
     pub e_stop: bool,
-    /// The tasks that the rig serves have not checked in.
+    /// True if the tasks that the rig serves have not checked in.
     pub hung: bool,
     /// The lever's upper limit switch, while it should be open.
     pub lever_top: bool,
@@ -89,23 +90,23 @@ pub struct Seen<'a> {
     pub lever_left: bool,
     /// The limit switch that the stage is moving towards, while it should be open.
     pub stage_limit: bool,
-    /// How fast the stage should go, mm/s.
+    /// Commanded speed of the stage, mm/s.
     pub stage_wanted_mm_s: f32,
-    /// How far the stage has come, mm.
+    /// Position of the stage, mm.
     pub stage_mm: f32,
-    /// How fast the stage's motor turns by its back-EMF, mm/s.
+    /// Speed of the stage's motor by its back-EMF, mm/s.
     pub emf_mm_s: f32,
 }
 
-/// A limit switch, or the emergency stop. It is believed when it has been pressed for 3 ms: less is its bouncing, or a
-/// disturbance of its wire.
+/// A limit switch, or the emergency stop. It counts as closed when it has been pressed for 3 ms: less is its bouncing,
+/// or a disturbance of its wire.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Switch {
     closed_ms: u32,
 }
 
 impl Switch {
-    /// Another millisecond; whether the switch is believed to be closed.
+    /// Takes another millisecond; returns true if the switch counts as closed.
     pub(super) fn tick(&mut self, closed: bool) -> bool {
         self.closed_ms = if closed {
             self.closed_ms.saturating_add(1)
@@ -120,7 +121,7 @@ impl Switch {
 #[derive(Clone, Debug, Default)]
 pub struct Guard {
     unguarded: Unguarded,
-    /// For how many ms nothing was heard of P_AC and of P_DC.
+    /// Time without a word of P_AC and of P_DC, ms.
     silent_ms: [u32; 2],
     /// The last P_AC and P_DC, and for how many ms they have not changed.
     last: [Option<Pressure>; 2],
@@ -132,8 +133,8 @@ pub struct Guard {
     /// For how many ms the lever's switch has been open without a break while it should be closed.
     left_ms: u32,
     stage_limit: Switch,
-    /// How far the stage should have come, has come by its encoder and has come by its motor's back-EMF, in mm since it
-    /// began to move: the last [`MOTION_MS`] and where the next goes.
+    /// Way of the stage by its command, its encoder and its motor's back-EMF, mm since it began to move: a ring of the
+    /// last [`MOTION_MS`] and its next index.
     motion: [[f32; 3]; MOTION_MS],
     motion_ms: usize,
 }
@@ -147,46 +148,46 @@ impl Guard {
         }
     }
 
-    /// Forgets what it has seen, not what it ignores.
+    /// Forgets its history, not the faults that it ignores.
     pub fn reset(&mut self) {
         *self = Self::new(self.unguarded);
     }
 
-    /// Whether `fault` is looked for.
+    /// Returns true if `fault` is looked for.
     pub fn looks_for(&self, fault: Fault) -> bool {
         !self.unguarded.ignores(fault)
     }
 
-    /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`HIGH_FORCE_LIMIT_MN`]. The first of
-    /// several faults is the one that can hurt most.
+    /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`HIGH_FORCE_LIMIT_MN`]. The
+    /// first of several faults is the one that can hurt most.
     #[inline]
     pub fn tick(
         &mut self,
-        seen: &Seen<'_>,
+        inputs: &GuardInputs<'_>,
         meter: &ForceMeter,
         model: &FingerModel,
         mn_per_count: f32,
         limit_mn: f32,
     ) -> Option<Fault> {
-        let sensor = self.sensor(seen.words);
-        let stage = self.stage(seen);
+        let sensor = self.sensor(inputs.words);
+        let stage = self.stage(inputs);
         // its second contact has taken the motors' supply by then
-        let e_stop = self.e_stop.tick(seen.e_stop);
-        let lever_top = self.lever_top.tick(seen.lever_top);
-        self.left_ms = if seen.lever_left {
+        let e_stop = self.e_stop.tick(inputs.e_stop);
+        let lever_top = self.lever_top.tick(inputs.lever_top);
+        self.left_ms = if inputs.lever_left {
             self.left_ms.saturating_add(1)
         } else {
             0
         };
-        let stage_limit = self.stage_limit.tick(seen.stage_limit);
-        // a calibration that says less than the model's does not allow more
+        let stage_limit = self.stage_limit.tick(inputs.stage_limit);
+        // a calibration with less than the model's force per count does not allow more
         let mn_per_count = mn_per_count.max(model.calibration.force_mn_per_count);
         let force = meter.counts().max(meter.counts_now()) * mn_per_count
             > limit_mn.min(HIGH_FORCE_LIMIT_MN);
         [
             force.then_some(Fault::ForceHigh),
             e_stop.then_some(Fault::EStop),
-            seen.hung.then_some(Fault::TasksHung),
+            inputs.hung.then_some(Fault::TasksHung),
             lever_top.then_some(Fault::LeverLimit),
             (self.left_ms >= LEFT_MS).then_some(Fault::LeverNotHome),
             stage_limit.then_some(Fault::StageLimit),
@@ -223,7 +224,7 @@ impl Guard {
                 }
             }
         }
-        // where nothing at all is heard, that is silence and no damage
+        // where no word comes at all, that is silence and no damage
         if damaged as usize == words.len() {
             damaged = 0;
         }
@@ -249,8 +250,8 @@ impl Guard {
     }
 
     #[inline]
-    fn stage(&mut self, seen: &Seen<'_>) -> Option<Fault> {
-        let wanted = libm::fabsf(seen.stage_wanted_mm_s);
+    fn stage(&mut self, inputs: &GuardInputs<'_>) -> Option<Fault> {
+        let wanted = libm::fabsf(inputs.stage_wanted_mm_s);
         let Some(slot) = self
             .motion
             .get(self.motion_ms.wrapping_sub(1) % MOTION_MS)
@@ -262,8 +263,8 @@ impl Guard {
         let [expected, _, turned] = if self.motion_ms == 0 { [0.0; 3] } else { *slot };
         let now = [
             expected + wanted * 1e-3,
-            seen.stage_mm,
-            turned + libm::fabsf(seen.emf_mm_s) * 1e-3,
+            inputs.stage_mm,
+            turned + libm::fabsf(inputs.emf_mm_s) * 1e-3,
         ];
         let oldest = self.motion.get_mut(self.motion_ms % MOTION_MS)?;
         let before = core::mem::replace(oldest, now);

@@ -1,7 +1,7 @@
 //! The lever's motor: it lowers the finger until the force is right, holds, and lifts it again.
 //!
-//! A state machine that is called once a millisecond. It returns a step rate; the caller makes the steps, counts them and
-//! passes the count to the next call.
+//! A state machine that is called once a millisecond. It returns a step rate; the caller makes the steps, counts them
+//! and passes the count to the next call.
 
 use super::fault::Fault;
 use super::force::ForceMeter;
@@ -14,12 +14,14 @@ use crate::sensor::pressure::{Calibration, Counts};
 pub const STEP_UM: f32 = 0.625;
 /// Steps per second while approaching: 0.5 mm/s (Methods, "Force Control with Stepper Motor").
 pub const APPROACH_STEPS_S: i32 = 800;
-/// Steps per second through the air, down to the first contact in P_AC or P_DC: 2 mm/s, at which a stepper stops on a step. Until
-/// the mean of P_DC shows it and the motor stands, 11 ms, it makes 22 um: 50 mN on a hard sample, half of the lightest press.
+/// Steps per second through the air, down to the first contact in P_AC or P_DC: 2 mm/s, at which a stepper stops on a
+/// step. Until the mean of P_DC shows it and the motor stands, 11 ms, it makes 22 um: 50 mN on a hard sample, half of
+/// the lightest press.
 pub const DESCENT_STEPS_S: i32 = 3200;
 /// After that the lever stands until the whole mean of P_DC, 10 ms, and the one before are of the standing finger.
 const REST_MS: u32 = 20;
-/// It goes slowly from this far above the last contact on, 0.15 mm: that was seen some hundredths of a millimetre below the surface.
+/// It goes slowly from this far above the last contact on, 0.15 mm: that was seen some hundredths of a millimetre below
+/// the surface.
 const NEAR_STEPS: i32 = 240;
 /// The mean of P_DC is of 10 ms, and the skin comes back within 100 (chosen).
 const RESTS_MS: u32 = 100;
@@ -27,26 +29,27 @@ const RESTS_MS: u32 = 100;
 pub const RETRACT_STEPS_S: i32 = -3200;
 /// Steps per second while the force is trimmed: slow enough to stop on a step.
 const TRIM_STEPS_S: i32 = 200;
-/// Between trials the finger hangs this far above the last contact: 1 mm. It is pressed on no further below that than this
-/// while P_DC shows no contact: that is 1 N on a hard sample.
+/// Between trials the finger hangs this far above the last contact: 1 mm. It is pressed on no further below that than
+/// this while P_DC shows no contact: that is 1 N on a hard sample.
 const CLEARANCE_STEPS: i32 = 1600;
-/// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Where nothing was touched
-/// by then, there is no sample.
+/// The lever goes at most this far below the limit switch: 16 mm, just above its lower end. Without contact by then,
+/// there is no sample.
 pub const MAX_STEPS: i32 = 25_600;
-/// A finger that presses on something thin goes on to the lower end itself: 17 mm below the limit switch.
+/// A finger that presses on something thin continues to the lower end itself: 17 mm below the limit switch.
 const END_STEPS: i32 = 27_200;
 /// Contact is seen when the mean of P_DC has risen by this, mN: 3 counts of a BioTac, thirty times its noise.
 const CONTACT_MN: f32 = 34.5;
-/// The zero was taken in the air if P_DC does not rise by a third of that in the first 0.1 mm of the way down, 200 ms: the
-/// softest sample would show 18 mN.
+/// The zero was taken in the air if P_DC does not rise by a third of that in the first 0.1 mm of the way down, 200 ms:
+/// the softest sample would show 18 mN.
 const CLEAR_MS: u32 = 200;
 /// Nearer to the top than this the limit switch may be closed, further down it must be open: 1 mm, the switch's
 /// own way and the half millimetre from it to the hard stop.
 const NEAR_TOP_STEPS: i32 = 1600;
 /// The switch closes at the same place each time, this exactly: one sixteenth of a millimetre.
 const SWITCH_STEPS: i32 = 100;
-/// A lever that hangs over the sample for this long goes up to its switch, which sees it come down. One that came down by itself
-/// at the speed of an approach would touch after [`CLEARANCE_STEPS`], 2 s; a choice among movements takes 1 s at most.
+/// A lever that hangs over the sample for this long goes up to its switch, which sees it come down. One that came down
+/// by itself at the speed of an approach would touch after [`CLEARANCE_STEPS`], 2 s; a choice among movements takes 1 s
+/// at most.
 const HANGS_MS: u32 = 1500;
 /// A trim makes no more steps than this: 0.75 mm.
 const TRIM_STEPS: f32 = 1200.0;
@@ -78,15 +81,16 @@ const SOFTEST_MN: f32 = STEP_UM;
 const TRIM_MS: u32 = 20_000;
 const LIFT_MS: u32 = 10_000;
 const APPROACH_MS: u32 = 60_000;
-/// A press beyond this, mN, stands still twice on its way, at these shares of its target: a skin that leaks over seconds
-/// looks like a sample that gives way for as long as the lever steps. Lighter presses are over before it matters.
+/// A press beyond this, mN, stands still twice on its way, at these shares of its target: a skin that leaks over
+/// seconds looks like a sample that gives way for as long as the lever steps. Lighter presses are over before it
+/// matters.
 const STANDS_FROM_MN: f32 = 1380.0;
 const STANDS_AT: [f32; 2] = [0.5, 0.75];
 /// While it stands P_DC is weighed twice: from 50 to 150 ms and from [`SETTLE_MS`] on, 200 ms later.
 const FIRST_WEIGH_MS: u32 = 50;
 const BETWEEN_WEIGHINGS_S: f32 = 0.2;
-/// What leaks away until the target is reached is at most this, mN, if it leaks on as it does while the lever stands:
-/// so much more on the finger than P_DC says (chosen: with the guard's limit and the trims, less than 2.2 N).
+/// Largest leak until the target is reached, mN, if it continues as while the lever stands: the finger bears so much
+/// more than P_DC shows (chosen: with the guard's limit and the trims, less than 2.2 N).
 const LEAK_MN: f32 = 92.0;
 /// Tolerance of a pressed finger: this, mN (a BioTac's count), or 5 %, whichever is more.
 const TOLERANCE_MN: f32 = 11.5;
@@ -96,7 +100,7 @@ const ZERO_MS: u32 = 200;
 /// Vibration of the motor dies down before the zero is taken.
 const QUIET_MS: u32 = 100;
 
-/// What the lever is doing.
+/// The states of the lever.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum LeverState {
     /// Its position is not known, the motor stands.
@@ -104,7 +108,7 @@ pub enum LeverState {
     Unknown,
     /// Up, to the limit switch.
     Homing,
-    /// The same of a lifted finger that waits: what is known of the sample stays known.
+    /// The same of a lifted finger that waits: the place of the sample stays known.
     Parking,
     /// Lifted and standing.
     Lifted,
@@ -116,7 +120,7 @@ pub enum LeverState {
     Settling,
     /// Pressed; the last correction is being stepped, to this count.
     Trimming(i32),
-    /// Pressed with the force that was asked for. The motor stands, whatever the force does.
+    /// Pressed with the target force. The motor stands, at any change of the force.
     Holding,
     /// Up, to this count of steps.
     Retracting(i32),
@@ -127,10 +131,10 @@ pub enum LeverState {
 pub struct Lever {
     finger: &'static FingerModel,
     state: LeverState,
-    /// Force asked for, in counts above no contact.
+    /// Target force, in counts above no contact.
     target: f32,
     trims: u8,
-    /// How often it has stood still on its way, the first mean of P_DC there, and P_DC summed up since contact, counts times s.
+    /// Number of stops on the way, the first mean of P_DC there, and P_DC summed up since contact, counts times s.
     stood: usize,
     first: f32,
     pressed: f32,
@@ -149,7 +153,7 @@ pub struct Lever {
     at_switch: bool,
     /// Count of steps at the last contact.
     contact: Option<i32>,
-    /// It comes down through the air, and for so long it stands where it touched then, ms.
+    /// True if the lever comes down through the air; then the time that it stands where it touched, ms.
     descends: bool,
     rest_ms: u32,
     progress: Progress,
@@ -157,7 +161,7 @@ pub struct Lever {
 }
 
 impl Lever {
-    /// A lever that does not know where it is and presses such a finger, with all guards but `unguarded`.
+    /// A lever whose place is unknown, for such a finger, with all guards but `unguarded`.
     pub fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
         Self::with(finger, Progress::new(finger, unguarded))
     }
@@ -186,7 +190,7 @@ impl Lever {
         }
     }
 
-    /// Forgets where it is: it may be moved by hand now.
+    /// Forgets its place: it may be moved by hand now.
     pub fn lose(&mut self) {
         *self = Self::with(self.finger, self.progress.clone());
     }
@@ -200,32 +204,32 @@ impl Lever {
         }
     }
 
-    /// What it is doing.
+    /// The current state.
     pub fn state(&self) -> LeverState {
         self.state
     }
 
-    /// Whether the finger is certainly off the sample, and the motor stands.
+    /// Returns true if the finger is certainly off the sample and the motor stands.
     pub fn is_lifted(&self) -> bool {
         self.state == LeverState::Lifted
     }
 
-    /// Whether it is lifted and has stood for so long that P_DC says nothing of its way any more.
+    /// Returns true if it is lifted and has stood so long that P_DC no longer shows its way.
     pub fn rests(&self) -> bool {
         self.is_lifted() && self.ms > RESTS_MS
     }
 
-    /// Whether the finger is lifted and goes up to the limit switch.
+    /// Returns true if the finger is lifted and goes up to the limit switch.
     pub fn is_parking(&self) -> bool {
         self.state == LeverState::Parking
     }
 
-    /// Whether it stands at the limit switch, so that the switch must be closed.
+    /// Returns true if it stands at the limit switch, so that the switch must be closed.
     pub fn is_at_switch(&self) -> bool {
         self.at_switch && matches!(self.state, LeverState::Lifted | LeverState::Zeroing)
     }
 
-    /// Whether it is so far below the limit switch that the switch must be open.
+    /// Returns true if it is so far below the limit switch that the switch must be open.
     pub fn is_down(&self, steps: i32) -> bool {
         let known = !matches!(self.state, LeverState::Unknown | LeverState::Homing);
         known && steps - self.top > NEAR_TOP_STEPS
@@ -236,14 +240,14 @@ impl Lever {
         self.zero
     }
 
-    /// Goes up to the limit switch. This is also what lifts the finger whatever has happened: a lever that knows where it
-    /// is believes the switch only at the top, for a switch that sticks must not leave the finger down.
+    /// Goes up to the limit switch. This also lifts the finger after any fault: a lever that knows its place trusts the
+    /// switch only at the top, for a switch that sticks must not leave the finger down.
     pub fn home(&mut self) {
         self.enter(LeverState::Homing);
     }
 
-    /// Brings a finger that hangs over the sample up to the limit switch, which says whether it stays lifted, whatever the sensor
-    /// does. Whether it begins to.
+    /// Brings a finger that hangs over the sample up to the limit switch, which shows whether it stays lifted,
+    /// independent of the sensor. Returns true if the way begins.
     pub fn park(&mut self) -> bool {
         let hangs = self.is_lifted() && !self.at_switch;
         if hangs {
@@ -252,12 +256,13 @@ impl Lever {
         hangs
     }
 
-    /// The lifted finger waits for another millisecond: parks it if it has done so for too long. Whether it begins to.
+    /// Counts another millisecond of waiting: parks the lifted finger if it has waited for too long. Returns true if
+    /// the way begins.
     pub fn wait(&mut self) -> bool {
         self.ms >= HANGS_MS && self.park()
     }
 
-    /// Has to be homed again. It goes on knowing its top.
+    /// Requires another homing. The top stays known.
     pub fn reset(&mut self) {
         self.enter(LeverState::Unknown);
     }
@@ -308,8 +313,9 @@ impl Lever {
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
             LeverState::Homing | LeverState::Parking => {
-                // Lower than it was, the lever goes on: if the switch is stuck, that is right; if steps were lost, it stands
-                // at its hard stop until the count is right again. Higher, and steps up were lost: there the top is now.
+                // Lower than it was, the lever continues: if the switch is stuck, that is right; if steps were lost, it
+                // stands at its hard stop until the count is right again. Higher, and steps up were lost: there the top
+                // is now.
                 if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
                     self.top = if self.known {
                         self.top.min(steps)
@@ -423,8 +429,8 @@ impl Lever {
         let lowest = contact.map_or(MAX_STEPS, |_| END_STEPS);
         let at_end = self.ms > APPROACH_MS || steps - self.top >= lowest;
         match contact {
-            // less than no contact: the zero has drifted, and with it the force that would be pressed. More at once: something
-            // pressed when it was taken
+            // less than no contact: the zero has drifted, and with it the force that would be pressed. A larger
+            // difference: something pressed when it was taken
             None if mean < -contact_counts
                 || (self.ms < CLEAR_MS && mean > contact_counts / 3.0) =>
             {
@@ -478,10 +484,10 @@ impl Lever {
         share.copied().unwrap_or(1.0) * self.target
     }
 
-    /// On its way: does P_DC fall while the lever stands, as it does with a skin that leaks?
+    /// Looks for a skin that leaks: P_DC falls while the lever stands on its way.
     fn look_for_leak(&mut self, counts: f32) -> Result<i32, Fault> {
         let share_per_s = (self.first - counts) / counts / BETWEEN_WEIGHINGS_S;
-        // what was pressed until now is to the whole as the square of the force, or less
+        // the pressure until now is to the whole as the square of the force, or less
         let still = self.target / counts;
         if share_per_s * self.pressed * still * still > self.finger.counts(LEAK_MN) {
             return Err(Fault::PressureDead);
@@ -492,7 +498,7 @@ impl Lever {
         Ok(APPROACH_STEPS_S)
     }
 
-    /// The skin has settled: is the force right, or how many steps is it off?
+    /// The skin has settled: finds whether the force is right, or how many steps it is off.
     #[inline]
     fn weigh(&mut self, meter: &ForceMeter, steps: i32) -> Result<i32, Fault> {
         let Some(counts) = meter.long_counts() else {

@@ -1,15 +1,16 @@
-//! A rig whose finger an arm of somebody else moves, over the link: [`RigOverLink`] asks for press, slide and lift, samples the
-//! finger meanwhile, and judges what the arm says it did by P_DC and by its own clock. It is called once a millisecond, as
-//! [`Control`](super::control::Control) is on a rig with motors, and has its phases.
+//! A rig whose finger is moved by an external arm over the link: [`RigOverLink`] asks for press, slide and lift,
+//! samples the finger meanwhile, and checks the arm's reports by P_DC and by its own clock. It is called once a
+//! millisecond, as [`Control`](super::control::Control) is on a rig with motors, and has its phases.
 //!
-//! The guard is here, not at the arm: whatever it sees, the arm is told to stop and to lift the finger before anything is reported.
+//! The guard is here, not at the arm: at any fault it orders the arm to stop and to lift the finger before anything is
+//! reported.
 
 use super::arm::{APPROACH_UM_S, ArmMovement, ArmOrder, ArmReport, ArmState, ArmTask, Orders};
 use super::ascent::is_far;
 use super::calibration::RigCalibration;
 use super::fault::Fault;
 use super::force::ForceMeter;
-use super::guard::{Guard, Seen, Unguarded, force_limit_mn, may_press};
+use super::guard::{Guard, GuardInputs, Unguarded, force_limit_mn, may_press};
 use super::phase::{Ended, HIGH_FORCE_MN, Phase, Refused};
 use super::pins::{Inputs, Outputs};
 use super::skin::SkinCare;
@@ -17,41 +18,43 @@ use super::slide::{LINK_MS, Run};
 use crate::features::{Movement, SamplePhase};
 use crate::sensor::{FingerModel, pressure::Channel};
 
-/// P_DC in the air is taken over so long a time before each press, ms.
+/// Time over which P_DC in the air is taken before each press, ms.
 const ZERO_MS: u32 = 300;
-/// The finger stands pressed so long before its background is measured: what the arm's last step shook dies away, ms.
+/// Time that the finger stands pressed before its background is measured, ms: the vibration of the arm's last step dies
+/// away.
 const SETTLE_MS: u32 = 300;
-/// How long the still finger is measured, ms.
+/// Time over which the still finger is measured, ms.
 const BACKGROUND_MS: u32 = 1000;
-/// P_DC in the air is measured over so long a time to calibrate it, ms.
+/// Time over which P_DC in the air is measured to calibrate it, ms.
 const AIR_MS: u32 = 2000;
-/// A lifted finger shows no more than this above its zero, mN.
+/// Largest P_DC above its zero that a lifted finger shows, mN.
 const LIFTED_MN: f32 = 92.0;
-/// So much more than a movement's force is too much: a share of it, and mN. With 1.26 N that is 1.66 N: an arm that comes down three
-/// times as fast as it was asked to stays below 2.2 N then, see `tests/arm.rs`.
+/// Excess over a movement's force that is a fault: a share of it, and mN. With 1.26 N that is 1.66 N: an arm that comes
+/// down at three times its speed limit stays below 2.2 N then, see `tests/core/arm.rs`.
 const TOO_HARD: (f32, f32) = (1.2, 150.0);
-/// Force at which a finger that is lifted, or on its way, is too hard on something, mN.
+/// Force that is a fault while the finger is lifted or on its way, mN.
 const IN_AIR_MN: f32 = 500.0;
 /// The pressed finger's force may be off the movement's by a share of it, and counts of P_DC.
 const FORCE_OFF: (f32, f32) = (0.10, 2.0);
-/// The mean force of a slide may differ from that of the still finger before it by mN and a share: friction, and a sample that is not flat.
+/// The mean force of a slide may differ from that of the still finger before it by mN and a share: friction, and a
+/// sample that is not flat.
 const SLIDE_OFF: (f32, f32) = (34.5, 0.25);
-/// Length and speed of a slide may be off by this share.
+/// Tolerance of a slide's length and speed, as a share.
 const SLIDE_SHARE: f32 = 0.05;
-/// No word of an arm about an open order for so long, ms: five of its words.
+/// Longest silence of an arm about an open order, ms: five of its reports.
 const SILENT_MS: u32 = 500;
 /// Longest that an arm may take to press and to lift: across its table, and down the last centimetre at 1 mm/s, ms.
 const PRESSES_MS: u32 = 30_000;
 const LIFTS_MS: u32 = 20_000;
 /// Longest from the order of a slide to its constant speed, and from its end to its report, ms.
 const RAMP_MS: u32 = 2000;
-/// It says that it is lifted: by then P_DC says so, too, ms.
+/// Time from the report that the finger is lifted until P_DC must show it, ms.
 const RELEASE_MS: u32 = 500;
-/// After a stop was demanded the force is under the limit by then, and the finger lifted by then, ms: an arm is taken to stand 100 ms
-/// after it, and has as long to go up.
+/// Time from a stop until the force must be under the limit, and as long again until the finger must be lifted, ms: an
+/// arm is assumed to stand after 100 ms, and has as long to go up.
 const STOPS_MS: u32 = 200;
 const FREE_MS: u32 = 2000;
-/// Then nobody waits any more for an arm that does not lift the finger, ms.
+/// Time after which the probe gives up on an arm that does not lift the finger, ms.
 const GAVE_UP_MS: u32 = 5000;
 
 /// A rig that an arm moves.
@@ -71,19 +74,20 @@ pub struct RigOverLink {
     length_mm: f32,
     start: u16,
     high_force: bool,
-    /// For how many ms the arm has said that it presses, slides at constant speed or is lifted.
+    /// Time for which the arm has reported that it presses, slides at constant speed or is lifted, ms.
     there_ms: Option<u32>,
     /// P_DC in the air was measured since the rig homed.
     zeroed: bool,
     air: Option<f32>,
     /// P_DC above no contact of the still finger, mean of the background.
     still: f32,
-    /// A weight of so many mN may come to lie on the lifted finger.
+    /// Weight that may be laid on the lifted finger, mN.
     expected_mn: f32,
 }
 
 impl RigOverLink {
-    /// A rig with such a finger, with all guards but `unguarded`. The arm is told to stop: nobody knows what it does.
+    /// A rig with such a finger, with all guards but `unguarded`. It orders the arm to stop: the arm's state is
+    /// unknown.
     pub fn new(
         finger: &'static FingerModel,
         calibration: RigCalibration,
@@ -112,17 +116,17 @@ impl RigOverLink {
         }
     }
 
-    /// What the rig is doing.
+    /// The current phase.
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// How the last movement ended, told once.
+    /// Takes the end of the last movement; `None` the second time.
     pub fn take_ended(&mut self) -> Option<Ended> {
         self.ended.take()
     }
 
-    /// Contact force in mN as P_DC has it, mean over 10 ms; 0 before it is known what P_DC is in the air.
+    /// Contact force in mN from P_DC, mean over 10 ms; 0 before P_DC in the air is known.
     pub fn force_mn(&self) -> f32 {
         if self.knows_air() {
             self.meter.force_mn(&self.calibration.pressure)
@@ -146,7 +150,7 @@ impl RigOverLink {
         &mut self.skin
     }
 
-    /// Whether forces up to 2 N are allowed.
+    /// Returns true if forces up to 2 N are allowed.
     pub fn high_force(&self) -> bool {
         self.high_force
     }
@@ -174,7 +178,7 @@ impl RigOverLink {
         Ok(())
     }
 
-    /// Has the arm lift the finger, and takes P_DC there for that of no contact.
+    /// Orders the arm to lift the finger, and takes P_DC there as that of no contact.
     ///
     /// # Errors
     /// See [`Refused`].
@@ -205,7 +209,7 @@ impl RigOverLink {
         Ok(())
     }
 
-    /// Makes one movement, beginning at `start`: 0 to 1 of the room that the sample leaves.
+    /// Makes one movement, beginning at `start`: 0 to 1 of the length that the sample leaves.
     ///
     /// # Errors
     /// See [`Refused`].
@@ -239,7 +243,7 @@ impl RigOverLink {
         Ok(())
     }
 
-    /// A person is asked to lay a weight of so many mN on the lifted finger; 0, and none is expected any more.
+    /// Expects a person to lay a weight of so many mN on the lifted finger; 0 ends that.
     ///
     /// # Errors
     /// See [`Refused`].
@@ -258,7 +262,7 @@ impl RigOverLink {
         }
     }
 
-    /// Has the arm stop and lift the finger.
+    /// Orders the arm to stop and to lift the finger.
     pub fn stop(&mut self) {
         match self.phase {
             Phase::Parked | Phase::Ready | Phase::Lifting | Phase::Faulted(_) => {}
@@ -269,8 +273,8 @@ impl RigOverLink {
         }
     }
 
-    /// Whether nothing moves: ready, parked, or at the end of a fault. The finger is lifted then, unless the fault is
-    /// [`Fault::ArmSilent`] or [`Fault::ArmRuns`].
+    /// Returns true if nothing moves: ready, parked, or at the end of a fault. The finger is lifted then, unless the
+    /// fault is [`Fault::ArmSilent`] or [`Fault::ArmRuns`].
     pub fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::Parked | Phase::Ready => true,
@@ -279,7 +283,7 @@ impl RigOverLink {
         }
     }
 
-    /// The arm says that the finger is lifted, and P_DC says so, too.
+    /// Returns true if the arm reports the finger as lifted and P_DC agrees.
     fn is_free(&self) -> bool {
         self.there_ms.is_some() && !self.is_pressed()
     }
@@ -308,7 +312,7 @@ impl RigOverLink {
         self.fails(fault, true);
     }
 
-    /// Whether it is this fault, and is looked for: the arm is told to stop then.
+    /// Returns true if `is_it` and this fault is looked for: the arm is ordered to stop then.
     fn fails(&mut self, fault: Fault, is_it: bool) -> bool {
         let fails = is_it && self.guard.looks_for(fault);
         if fails {
@@ -318,8 +322,8 @@ impl RigOverLink {
         fails
     }
 
-    /// One millisecond, and what the arm said in it: the samples' phase and samples, the line of permission
-    /// ([`Outputs::lever_enabled`], which an arm's protective stop may hang on), and the order that is to be sent now.
+    /// One millisecond, with the arm's report in it: sets the samples and their phase, the line of permission
+    /// ([`Outputs::lever_enabled`], which an arm's protective stop may hang on), and the order to be sent now.
     pub fn tick(&mut self, inputs: &Inputs, reports: &[ArmReport]) -> (Outputs, Option<ArmOrder>) {
         self.ms = self.ms.saturating_add(1);
         self.there_ms = self.there_ms.map(|ms| ms.saturating_add(1));
@@ -347,7 +351,7 @@ impl RigOverLink {
         (outputs, self.orders.tick())
     }
 
-    /// The force at which the arm is told to stop, mN.
+    /// Force at which the arm is ordered to stop, mN.
     fn limit_mn(&self) -> f32 {
         let high = self.high_force && self.movement.force_mn() > HIGH_FORCE_MN;
         let most_mn = force_limit_mn(&self.calibration.pressure, high);
@@ -355,7 +359,7 @@ impl RigOverLink {
             Phase::Parked | Phase::Ready | Phase::Positioning | Phase::Unloaded => {
                 IN_AIR_MN + self.expected_mn
             }
-            // nobody knows what it was at
+            // the arm's task before is unknown
             Phase::Homing => most_mn,
             _ => {
                 let (share, mn) = TOO_HARD;
@@ -365,9 +369,9 @@ impl RigOverLink {
         limit_mn.min(most_mn)
     }
 
-    /// What the guard sees. It looks at sensor and force; what else there is belongs to the arm.
+    /// The guard's fault, from sensor and force; all else belongs to the arm.
     fn watch(&mut self, inputs: &Inputs) -> Option<Fault> {
-        let seen = Seen {
+        let seen = GuardInputs {
             words: &inputs.words,
             e_stop: false,
             hung: inputs.hung,
@@ -386,17 +390,17 @@ impl RigOverLink {
             .guard
             .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn)?;
         match (self.phase, fault) {
-            // before it is known what P_DC is in the air, that says nothing
+            // before P_DC in the air is known, its height is meaningless
             (_, Fault::ForceHigh) if !self.knows_air() => None,
             (Phase::Faulted(Fault::ArmRuns), _) => None,
-            // a stop was demanded, and is not heeded
+            // a stop was ordered, and the arm does not obey
             (Phase::Faulted(_), Fault::ForceHigh) => (self.ms > STOPS_MS).then_some(Fault::ArmRuns),
             (Phase::Parked | Phase::Faulted(_), _) => None,
             (_, fault) => Some(fault),
         }
     }
 
-    /// The arm says how far it is.
+    /// Takes the arm's progress.
     fn heard(&mut self, state: ArmState) {
         let there = match (self.phase, state) {
             (Phase::Faulted(_), ArmState::Lifted) => true,
@@ -419,7 +423,7 @@ impl RigOverLink {
         }
     }
 
-    /// What takes too long.
+    /// Checks the time limits.
     fn wait(&mut self) {
         let (most_ms, waited_ms) = match self.phase {
             Phase::Homing | Phase::Lifting => (LIFTS_MS, self.ms),
@@ -451,7 +455,7 @@ impl RigOverLink {
         }
     }
 
-    /// Whether P_DC is the movement's force.
+    /// Returns true if P_DC shows the movement's force.
     fn presses_right(&self, counts: f32) -> bool {
         let mn_per_count = self.calibration.pressure.force_mn_per_count;
         let wanted = f32::from(self.movement.force_mn()) / mn_per_count;
@@ -465,7 +469,7 @@ impl RigOverLink {
             Phase::Homing if settled => self.take_zero_at_home(),
             Phase::Positioning if self.ms >= ZERO_MS => {
                 let air = self.meter.no_contact();
-                // it is on something, or was when its zero was taken
+                // the finger is on something, or was when its zero was taken
                 let far = is_far(self.finger, self.meter.long_mean(), air);
                 if self.fails(Fault::ArmOff, far) {
                     return;
@@ -511,7 +515,7 @@ impl RigOverLink {
                         self.meter.begin_long();
                     }
                     self.run.slid(ms.max(1), 0.0, inputs, outputs);
-                    // who moves the finger may know the shear, the probe does not
+                    // the arm's controller may know the shear, the probe does not
                     outputs.shear_mn = None;
                 }
             }
@@ -540,7 +544,7 @@ impl RigOverLink {
         }
     }
 
-    /// The finger is lifted, as the arm says: P_DC there is that of no contact, if it can be.
+    /// The arm reports the finger as lifted: takes P_DC there as that of no contact, if it is plausible.
     fn take_zero_at_home(&mut self) {
         match self.there_ms {
             Some(1) => self.meter.begin_long(),
@@ -560,7 +564,7 @@ impl RigOverLink {
         }
     }
 
-    /// The arm says that the slide is over: what it says is compared with what was asked for, with this clock, and with P_DC.
+    /// The arm reports the end of the slide: compares its figures with the movement, with this clock, and with P_DC.
     fn slid(&mut self, length_um: u32, speed_um_s: u32) {
         let off = |made: u32, wanted: f32| libm::fabsf(made as f32 - wanted) > wanted * SLIDE_SHARE;
         let speed = self.movement.speed_um_s() as f32;

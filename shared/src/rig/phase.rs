@@ -1,4 +1,4 @@
-//! What the rig is doing, how a movement ended, and why one was not made.
+//! The phases of the rig, the ends of a movement, and the reasons for not making one.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,10 +6,10 @@ use super::calibration::RigCalibrationError;
 use super::fault::Fault;
 use crate::features::{Movement, MovementError};
 
-/// Forces over this, 1.26 N, are pressed only by a rig that was allowed to.
+/// Largest force without permission for high forces, mN.
 pub const HIGH_FORCE_MN: u16 = Movement::FOR_TRACTION.force_mn();
 
-/// Largest force of a movement, mN, of a rig that was allowed high forces, or was not.
+/// Largest force of a movement, mN, with or without permission for high forces.
 pub const fn most_mn(high_force: bool) -> u16 {
     if high_force {
         *Movement::FORCE_MN.end()
@@ -18,14 +18,14 @@ pub const fn most_mn(high_force: bool) -> u16 {
     }
 }
 
-/// What the rig is doing.
+/// The phases of the rig.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Phase {
-    /// Nothing; the positions of lever and stage are unknown until it homes.
+    /// The rig does nothing; the positions of lever and stage are unknown until it homes.
     Parked,
     /// The lever, then the stage look for their limit switches.
     Homing,
-    /// Lifted and waiting.
+    /// The finger is lifted and waits.
     Ready,
     /// The stage goes to where the slide begins.
     Positioning,
@@ -33,7 +33,7 @@ pub enum Phase {
     Pressing,
     /// The still finger is measured.
     Background,
-    /// Sliding.
+    /// The finger slides.
     Sliding,
     /// The finger is lifted; then the slide is over.
     Lifting,
@@ -44,7 +44,7 @@ pub enum Phase {
     Faulted(Fault),
 }
 
-/// How a movement ended.
+/// The end of a movement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ended {
     /// All samples are there.
@@ -55,25 +55,26 @@ pub enum Ended {
     Stopped,
 }
 
-/// Why a command is refused.
+/// Reasons for refusing a command.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum Refused {
-    /// Something else is being done.
+    /// The rig is busy.
     #[error("the rig is busy; stop it first")]
     Busy,
     /// The positions of lever and stage are unknown: home first.
-    #[error("lever and stage do not know where they are; home them first")]
+    #[error("the positions of lever and stage are unknown; home them first")]
     NotHomed,
     /// A fault has to be reset first.
     #[error("{}: {}", .0, .0.recovery())]
     Fault(Fault),
-    /// The force is over what this rig may press.
+    /// The force is over this rig's limit.
     #[error(
-        "{0} mN is more than this rig may press: {HIGH_FORCE_MN} mN, or {most} mN with tactus device settings --high-force on, and no more than its calibration can tell",
+        "{0} mN is more than this rig may press: {HIGH_FORCE_MN} mN, or {most} mN with tactus device settings \
+         --high-force on, and no more than its calibration covers",
         most = most_mn(true)
     )]
     Force(u16),
-    /// No speed of this stage, um/s.
+    /// The stage does not have this speed, um/s.
     #[error("{}", MovementError::Speed(*.0))]
     Speed(u32),
     /// The slide does not fit on the sample.
@@ -84,7 +85,7 @@ pub enum Refused {
     Calibration(RigCalibrationError),
 }
 
-/// Why a rig with a stage and a lever did not make a movement.
+/// Reasons why a rig with a stage and a lever did not make a movement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum RigError {
     /// The movement was refused; nothing moved.
@@ -96,11 +97,11 @@ pub enum RigError {
     /// It was stopped, and the finger is lifted.
     #[error("stopped")]
     Stopped,
-    /// It did not come to an end by itself, and was stopped: see [`super::timeout`].
-    #[error("the rig does not come to an end: home it")]
+    /// The movement did not end by itself, and was stopped: see [`super::timeout`].
+    #[error("the movement does not end: home the rig")]
     Hangs,
-    /// Nobody made the movement by hand in time.
-    #[error("nobody touched anything for a minute: ask again")]
+    /// The movement was not made by hand in time.
+    #[error("no touch for a minute: ask again")]
     NobodyThere,
     /// A hand does not make this movement.
     #[error(
@@ -110,8 +111,8 @@ pub enum RigError {
 }
 
 impl RigError {
-    /// Whether this is about the one movement, and the rig may try it again or try another after it has homed: see
-    /// [`Fault::is_of_the_movement`]. Of a refusal, too, that goes by force, speed or length.
+    /// Returns true if the error is about the one movement, so that the rig may try it again or try another after it
+    /// has homed: see [`Fault::is_of_the_movement`]. That includes a refusal because of force, speed or length.
     pub const fn is_of_the_movement(&self) -> bool {
         match self {
             Self::Fault(fault) => fault.is_of_the_movement(),

@@ -1,4 +1,4 @@
-//! What goes in and out of the rig's control every millisecond: the only interface between the control and the board or
+//! Inputs and outputs of the rig's control, every millisecond: the only interface between the control and the board or
 //! the simulator.
 
 use crate::features::SamplePhase;
@@ -29,7 +29,7 @@ pub struct Inputs {
     pub hung: bool,
 }
 
-/// The state that the outputs are to have.
+/// The commanded state of the outputs.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     /// Steps per second of the lever, downwards positive; 0 holds.
@@ -40,7 +40,7 @@ pub struct Outputs {
     pub stage_duty: f32,
     /// The stage's bridge is on.
     pub stage_enabled: bool,
-    /// What the samples of this tick are.
+    /// The phase that this tick's samples belong to.
     pub sample_phase: SamplePhase,
     /// P_AC of this tick in counts about the still finger's, where it is sampled.
     pub pac: Vec<i16, MAX_WORDS>,

@@ -1,11 +1,12 @@
-//! Whether a lever that presses gets on: P_DC has to rise with its steps, and P_AC is the witness.
+//! Check of a press: P_DC has to rise with the lever's steps, and P_AC is the witness.
 //!
-//! P_AC is the same pressure as P_DC behind a high-pass of [`HIGH_PASS_S`]: where the pressure rises evenly, P_AC stands that
-//! time's rise above its rest, and summed up it is the rise itself. Vibrations of the motor have no mean and add nothing.
+//! P_AC is the same pressure as P_DC behind a high-pass of [`HIGH_PASS_S`]: where the pressure rises evenly, P_AC
+//! stands that time's rise above its rest, and summed up it is the rise itself. Vibrations of the motor have no mean
+//! and add nothing.
 //!
-//! How fast P_DC should rise is known, too. A finger is a ball on its plane: it gets the stiffer the harder it is pressed
-//! (Hertz). A sample that gives way makes the rise slower, but alike all the way; so the least compliance that was seen
-//! says what the next steps have to bring. A skin that leaks and a lever that slips fall behind that.
+//! The expected rise of P_DC is known, too. A finger is a ball on its plane: it gets the stiffer the harder it is
+//! pressed (Hertz). A sample that gives way makes the rise slower, but evenly all the way; so the least compliance so
+//! far predicts the rise of the next steps. A skin that leaks and a lever that slips fall behind that.
 
 use super::fault::Fault;
 use super::guard::Unguarded;
@@ -14,22 +15,24 @@ use crate::sensor::pressure::{Calibration, RATE_HZ};
 
 /// Time constant of P_AC's high-pass, s: 10 Hz (Methods, "BioTac").
 const HIGH_PASS_S: f32 = 1.0 / (core::f32::consts::TAU * 10.0);
-/// What P_AC said so long ago no longer counts for a contact, s: its rest is known to a tenth of a count only.
+/// Age at which P_AC no longer counts for a contact, s: its rest is known to a tenth of a count only.
 const MEMORY_S: f32 = 2.0;
 /// The rest is a mean over the last 10 to 20 s.
 const REST_SAMPLES: u32 = 20 * RATE_HZ;
-/// What is meant here by a count, mN: that of a BioTac, whose figures these are. Counts of another finger are converted.
+/// Force of a count in this file, mN: that of a BioTac, whose figures these are. Counts of another finger are
+/// converted.
 const COUNT_MN: f32 = Calibration::PAPER.force_mn_per_count;
 /// P_AC shows contact from this rise of the pressure on, in counts of P_DC: six times what a rest that was measured for
 /// 0.7 s may be off by, with the noise of 4.8 counts that real devices have. The motor's hum adds 0.1.
 const TOUCH_COUNTS: f32 = 1.0;
-/// P_DC has to rise by [`SEEN_COUNTS`] within these steps after P_AC shows contact, and by a segment after its own: 0.5 mm.
+/// P_DC has to rise by [`SEEN_COUNTS`] within these steps after P_AC shows contact, and by a segment after its own: 0.5
+/// mm.
 const SEEN_STEPS: i32 = 800;
 const SEEN_COUNTS: f32 = 3.0;
-/// Progress is judged piece by piece, each of so many counts of P_DC: twenty times the noise of its mean.
+/// Progress is checked piece by piece, each of so many counts of P_DC: twenty times the noise of its mean.
 const SEGMENT_COUNTS: f32 = 6.0;
-/// A piece may take the steps that it should by the least compliance so far, divided by this: noise and a sample that is not
-/// quite even.
+/// A piece may take the steps that it should by the least compliance so far, divided by this: noise and a sample that
+/// is not quite even.
 const LEAST_SHARE: f32 = 0.75;
 /// That compliance is seen from this P_DC on. Before, the finger touches less than 1.4 mm to either side, and a rough
 /// sample's own heights make a difference: there the mean counts, and ...
@@ -42,14 +45,14 @@ const LATER_STEPS: f32 = 600.0;
 const EARLY_STEPS: i32 = 1600;
 /// By so many counts of P_DC the two signals differ before they contradict each other.
 const AT_ODDS_COUNTS: f32 = 1.5;
-/// Steps per count of P_DC of a finger on a hard sample, at one count; they fall with the cube root of the counts (Hertz).
-/// Of a finger that gives way by 1.6 mm at 2 N.
+/// Steps per count of P_DC of a finger on a hard sample, at one count; they fall with the cube root of the counts
+/// (Hertz). Of a finger that gives way by 1.6 mm at 2 N.
 const FINGER_STEPS: f32 = 54.0;
 
-/// P_AC always has noise: one that has been the same for 10 ms is the guard's to judge, and says nothing here.
+/// P_AC always has noise: the guard checks a value that has been the same for 10 ms; it counts for nothing here.
 const FROZEN_SAMPLES: u32 = RATE_HZ / 100;
 
-/// Where a piece began.
+/// The beginning of a piece.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     steps: i32,
@@ -57,11 +60,11 @@ struct Mark {
     counts: f32,
 }
 
-/// How a press gets on.
+/// Progress of a press.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
     finger: &'static FingerModel,
-    /// What is meant by a count here, in counts of this finger.
+    /// Counts of this finger in one count of this file.
     counts: f32,
     unguarded: Unguarded,
     /// Sum and number of P_AC samples since the finger was lifted.
@@ -84,7 +87,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Judges such a finger by all guards but `unguarded`.
+    /// Checks such a finger by all guards but `unguarded`.
     pub(super) fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
         Self {
             finger,
@@ -138,12 +141,12 @@ impl Progress {
         self.of_piece += rise;
     }
 
-    /// Whether P_AC shows a contact that P_DC does not.
+    /// Returns true if P_AC shows a contact that P_DC does not.
     pub(super) fn is_touched(&self) -> bool {
         self.touched.is_some()
     }
 
-    /// Judges a millisecond of an approach: the steps made, P_DC above no contact, and whether it shows contact.
+    /// Checks a millisecond of an approach: the steps made, P_DC above no contact, and whether it shows contact.
     ///
     /// # Errors
     /// [`Fault::PressureDead`] or [`Fault::LeverSlips`].
@@ -217,7 +220,8 @@ impl Progress {
         (made > most || late).then(|| self.stalled(rise))
     }
 
-    /// Why P_DC has risen by no more than this: a lever that slips, and a skin that leaks, are the same to both signals.
+    /// The fault when P_DC has risen by no more than this: both signals look the same for a lever that slips and for a
+    /// skin that leaks.
     fn stalled(&self, rise: f32) -> Fault {
         if self.of_piece > rise + AT_ODDS_COUNTS {
             Fault::PressureDead

@@ -4,24 +4,24 @@ use crate::features::Movement;
 
 /// Wear after which the skin should be looked at, J of sliding weighted by [`wearing`].
 ///
-/// The paper changed the skin twice during 117 textures x 3 movements x 5 trials, every time there were visible signs of
-/// wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each at 8 mW. Half of that, so that the warning
-/// comes first.
+/// The paper changed the skin twice during 117 textures x 3 movements x 5 trials, every time there were visible signs
+/// of wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each at 8 mW. Half of that, so that the
+/// warning comes first.
 pub const WARN_J: f32 = 8.0;
 
-/// How much worse a joule is at this sliding power: the paper found that movements of high power wear the fingerprints
+/// Factor of wear per joule at this sliding power: the paper found that movements of high power wear the fingerprints
 /// off, which slow or light ones of the same energy do not. Chosen: twice as bad at the limit of
-/// [`Movement::is_high_wear`], and on in proportion.
+/// [`Movement::is_high_wear`], and in proportion above.
 pub fn wearing(power_mw: f32) -> f32 {
     1.0 + power_mw / Movement::WEAR_LIMIT_MW
 }
 
-/// A sum of millions of small parts: what a part loses to the sum's rounding is added with the next one (Kahan's), since the chip adds
-/// f64 in a hundred instructions.
+/// A sum of millions of small parts: the rounding error of each addition is added with the next part (Kahan's method),
+/// since the chip adds f64 in a hundred instructions.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 struct Sum {
     sum: f32,
-    /// So much too large is the sum.
+    /// Excess of the sum over the true value.
     excess: f32,
 }
 
@@ -58,8 +58,8 @@ impl SkinCare {
         }
     }
 
-    /// One millisecond of sliding. Where the shear is not measured the contact force stands in for it, with a coefficient
-    /// of friction of 1: a skin is then replaced too early rather than too late.
+    /// One millisecond of sliding. Where the shear is not measured the contact force stands in for it, with a
+    /// coefficient of friction of 1: a skin is then replaced too early rather than too late.
     pub(crate) fn slid(&mut self, shear_n: f32, force_n: f32, speed_mm_s: f32) {
         let friction = if shear_n > 0.0 {
             shear_n
@@ -82,7 +82,7 @@ impl SkinCare {
         self.wear_j.sum
     }
 
-    /// Whether the skin should be looked at before the next training.
+    /// Returns true if the skin should be looked at before the next training.
     pub fn is_worn(&self) -> bool {
         self.wear_j() > WARN_J
     }

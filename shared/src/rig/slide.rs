@@ -1,5 +1,5 @@
-//! The run of the stage that is being made, under the finger or without load: its path, when its speed is constant, and
-//! what its samples are. It knows nothing of the rest of the rig.
+//! One run of the stage, under the finger or without load: its path, the time of its constant speed, and the phase of
+//! its samples. It knows nothing of the rest of the rig.
 
 use core::ops::Range;
 
@@ -14,16 +14,16 @@ use crate::sensor::pressure::{Channel, RATE_HZ};
 const STEADY_S: f32 = 3.0;
 /// After the ramp the servo has this long to settle before samples count, s.
 const STEADY_MARGIN_S: f32 = 0.2;
-/// A word of an arm may be so long on its way, ms: that is left out at the end of a slide over the link.
+/// Longest delay of an arm's report on the link, ms: it is cut off the end of a slide over the link.
 pub(super) const LINK_MS: u32 = 150;
-/// P_AC words of a slide may differ from what its time holds by so many.
+/// Largest difference between the P_AC words of a slide and the number that its time holds.
 const WORDS_OFF: u32 = 4;
 
 /// One run of the stage.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     movement: Movement,
-    /// Where the slide begins and ends, mm.
+    /// Beginning and end of the slide, mm.
     path_mm: (f32, f32),
     /// Constant speed, as ms since the run began.
     steady_ms: Range<u32>,
@@ -51,8 +51,8 @@ impl Run {
         current: (0.0, 0),
     };
 
-    /// The slide of a movement, beginning at `start`: 0 to 1 of the room that the sample leaves. `None`: it does not fit on
-    /// the sample.
+    /// The slide of a movement, beginning at `start`: 0 to 1 of the length that the sample leaves. `None` if it does
+    /// not fit on the sample.
     pub(super) fn slide(movement: Movement, start: f32, stage: &StageConstants) -> Option<Self> {
         let speed = movement.speed_mm_s();
         let sample = SlidePath::SAMPLE_MM.min(stage.travel_mm - 2.0 * MARGIN_MM);
@@ -78,8 +78,8 @@ impl Run {
         })
     }
 
-    /// The slide of a movement that an arm makes, and its length at constant speed, mm. Its time begins with the arm's word that the
-    /// speed is constant, and ends before it would be over if that came late.
+    /// The slide of a movement that an arm makes, and its length at constant speed, mm. Its time begins with the arm's
+    /// report that the speed is constant, and ends before it would be over if that came late.
     pub(super) fn over_link(movement: Movement) -> (Self, f32) {
         let length_mm = (movement.speed_mm_s() * STEADY_S).min(SlidePath::LONGEST_MM);
         let path = SlidePath::new(movement, length_mm);
@@ -108,12 +108,12 @@ impl Run {
         }
     }
 
-    /// The movement that is made.
+    /// The current movement.
     pub(super) fn movement(&self) -> Movement {
         self.movement
     }
 
-    /// Where the slide begins and ends, mm.
+    /// Beginning and end of the slide, mm.
     pub(super) fn path_mm(&self) -> (f32, f32) {
         self.path_mm
     }
@@ -177,7 +177,7 @@ impl Run {
         self.steady_ms.end = self.steady_ms.end.min(ms.saturating_add(1));
     }
 
-    /// How a slide of so many ms has ended.
+    /// The end of a slide of so many ms.
     pub(super) fn ended(&mut self, ms: u32) -> Ended {
         let missing = samples(ms).abs_diff(self.words);
         self.damaged += if missing > WORDS_OFF { missing } else { 0 };
@@ -196,7 +196,7 @@ impl Run {
                 Some(word) if word.channel == Channel::Pac => {
                     self.words = self.words.saturating_add(1);
                     let about = i32::from(word.counts.get()) - self.baseline;
-                    // there is room for as many as there are words
+                    // the vector holds as many as there are words
                     let _ = outputs.pac.push(about as i16);
                 }
                 Some(_) => {}

@@ -1,4 +1,4 @@
-//! What a slide asks of the stage.
+//! The path of the stage in a slide.
 
 use crate::features::Movement;
 
@@ -18,7 +18,7 @@ impl SlidePath {
     pub const ACCELERATION_MM_S2: f32 = 1000.0;
     /// The square of texture is 75 mm wide (Methods, "Textures").
     pub const SAMPLE_MM: f32 = 75.0;
-    /// Longest slide at constant speed: what is left of the sample is where its start may be drawn from.
+    /// Longest slide at constant speed: the rest of the sample is the range for its random start.
     pub const LONGEST_MM: f32 = 60.0;
 
     /// A slide of `length_mm` at the speed of `movement`, with the reference stage's acceleration.
@@ -50,8 +50,8 @@ impl SlidePath {
         self.length_mm + self.speed_mm_s * self.ramp_s()
     }
 
-    /// Where the slide may start so that the finger stays on a sample of `sample_mm`, as the room in mm behind the first
-    /// possible start; `None` if the slide does not fit at all.
+    /// Range of the slide's start in mm behind the first possible one, so that the finger stays on a sample of
+    /// `sample_mm`; `None` if the slide does not fit at all.
     pub fn start_room_mm(&self, sample_mm: f32) -> Option<f32> {
         let margin = sample_mm - self.travel_mm();
         (margin >= 0.0).then_some(margin)

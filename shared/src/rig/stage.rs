@@ -30,8 +30,8 @@ pub struct StageConstants {
 }
 
 impl StageConstants {
-    /// The reference stage: 12 V, a 10 mm screw, 16.4 N/A, 1.2 kg, an encoder of 1 um. The gains hold the speed within 1 %
-    /// where a real finger's tangential force jumps; with 1.5 ms of delay they leave a phase margin of 38 degrees.
+    /// The reference stage: 12 V, a 10 mm screw, 16.4 N/A, 1.2 kg, an encoder of 1 um. The gains hold the speed within
+    /// 1 % where a real finger's tangential force jumps; with 1.5 ms of delay they leave a phase margin of 38 degrees.
     pub const REFERENCE: Self = Self {
         mm_per_count: 1e-3,
         travel_mm: 77.0,
@@ -46,15 +46,15 @@ impl StageConstants {
         emf_v_per_mm_s: 0.0164,
     };
 
-    /// Speed in mm/s at which the motor must be turning, from what it is given and what it takes: tells a blocked stage
-    /// from a silent encoder.
+    /// Speed in mm/s at which the motor must be turning, from its voltage and current: tells a blocked stage from a
+    /// silent encoder.
     pub fn emf_speed_mm_s(&self, duty: f32, current_a: f32) -> f32 {
         (duty * self.supply_v - current_a * self.resistance_ohm) / self.emf_v_per_mm_s
     }
 }
 
-/// Largest distance between profile and stage that is still following: so many mm, and the way of so many s. Long enough
-/// for the guard to say why the stage stands.
+/// Largest distance between profile and stage that is still following: so many mm, and the way of so many s. Long
+/// enough for the guard to find why the stage stands.
 const FOLLOWING_MM: f32 = 1.0;
 const FOLLOWING_S: f32 = 0.04;
 /// Velocity is taken over this many ms of encoder counts.
@@ -63,9 +63,10 @@ const VELOCITY_MS: usize = 2;
 pub const MARGIN_MM: f32 = 1.0;
 /// Most duty from the integral: enough for a loaded stage, and not for one that runs away without an encoder.
 const MAX_INTEGRAL: f32 = 0.25;
-/// While homing, no guard tells a blocked stage from a silent encoder: less is allowed.
+/// The same while homing, when no guard tells a blocked stage from a silent encoder: less is allowed.
 const HOMING_FOLLOWING_MM: f32 = 0.5;
-/// The switch is searched at this speed; it is 4 mm before the hard stop, and the shorted motor brakes within one. Then ...
+/// The switch is searched at this speed; it is 4 mm before the hard stop, and the shorted motor brakes within one. Then
+/// ...
 const SEARCH_MM_S: f32 = 40.0;
 /// ... it is touched again at this speed, in which the 3 ms until it is believed are 30 um.
 const TOUCH_MM_S: f32 = 10.0;
@@ -77,10 +78,10 @@ const ARRIVED_MM: f32 = 0.3;
 /// It has time for that after the profile's end, ms.
 const ARRIVE_MS: u32 = 300;
 
-/// What the stage is doing.
+/// The states of the stage.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum StageState {
-    /// It does not know where it is; the motor is off.
+    /// The position is unknown; the motor is off.
     Unknown,
     /// Towards the left limit switch.
     Homing(Profile),
@@ -98,7 +99,7 @@ pub struct Profile {
     distance_mm: f32,
     speed_mm_s: f32,
     acceleration_mm_s2: f32,
-    /// How long a ramp takes, and the whole way, s.
+    /// Duration of a ramp, and of the whole way, s.
     ramp_s: f32,
     duration_s: f32,
     ms: u32,
@@ -128,10 +129,10 @@ impl Profile {
         }
     }
 
-    /// Ends it as soon as its ramp allows: from now on the ramp down. One that is on its ramp down goes on.
+    /// Ends it as soon as its ramp allows: from now on the ramp down. One that is on its ramp down continues.
     fn brake(&mut self) {
         let t = self.ms as f32 * 1e-3;
-        // on the ramp up it is not as fast as it was to be
+        // on the ramp up it has not reached its speed yet
         let ramp_s = self.ramp_s.min(t);
         if t + ramp_s < self.duration_s {
             self.speed_mm_s = self.acceleration_mm_s2 * ramp_s;
@@ -187,7 +188,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A stage that does not know where it is.
+    /// A stage whose position is unknown.
     pub fn new(constants: StageConstants) -> Self {
         Self {
             constants,
@@ -198,7 +199,7 @@ impl Stage {
         }
     }
 
-    /// What it is doing.
+    /// The current state.
     pub fn state(&self) -> StageState {
         self.state
     }
@@ -224,7 +225,8 @@ impl Stage {
         newest
     }
 
-    /// Looks for the left limit switch: in search first, and when that has found it and the stage is off it again, slowly.
+    /// Looks for the left limit switch: in search first, and when that has found it and the stage is off it again,
+    /// slowly.
     pub fn home(&mut self) {
         let (way, speed_mm_s) = if self.searched {
             (TOUCH_MM, TOUCH_MM_S)
@@ -239,13 +241,13 @@ impl Stage {
         Profile::new(self.position_mm(), to_mm, speed_mm_s, acceleration)
     }
 
-    /// Whether the limit switch still has to be touched slowly: [`Stage::home`] once more.
+    /// Returns true if the limit switch still has to be touched slowly: call [`Stage::home`] once more.
     pub fn is_searched(&self) -> bool {
         self.searched
     }
 
-    /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile says how long
-    /// it takes.
+    /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile gives the
+    /// time.
     #[inline]
     pub fn go(&mut self, to_mm: f32, speed_mm_s: f32) -> Option<Profile> {
         if self.state != StageState::Standing {
@@ -265,7 +267,7 @@ impl Stage {
         self.searched = false;
     }
 
-    /// The motor goes off, whatever it was doing.
+    /// The motor goes off, from any state.
     pub fn stop(&mut self) {
         if self.searched || matches!(self.state, StageState::Unknown | StageState::Homing(_)) {
             self.forget();
@@ -282,8 +284,8 @@ impl Stage {
         }
     }
 
-    /// One millisecond: the encoder's count, and whether the left limit switch is pressed. Returns the duty of the motor,
-    /// -1 to 1.
+    /// One millisecond: the encoder's count, and whether the left limit switch is pressed. Returns the duty of the
+    /// motor, -1 to 1.
     ///
     /// # Errors
     /// The motor is to be off.
@@ -327,7 +329,7 @@ impl Stage {
             }
             self.state = StageState::Moving(profile);
         }
-        // the velocity lags by half of what it is taken over
+        // the velocity lags by half of its averaging time
         let lag_s = VELOCITY_MS as f32 * 0.5e-3;
         let v_then = if t < lag_s {
             0.0
@@ -399,7 +401,7 @@ mod tests {
                     (x_then - x).abs() < 1e-3 && (v_then - v).abs() < 1e-2,
                     "{ms}"
                 );
-                // what was braking already goes on
+                // a stage that was braking already continues
                 let slows = a * v < 0.0;
                 let way = v * v / 2000.0 * v.signum();
                 let stands = profile.at(1e3).0;
@@ -444,7 +446,7 @@ mod tests {
         assert_eq!(stage.state(), StageState::Standing);
     }
 
-    /// Follows the profile to the hair, or stands still, without ever closing the switch: how far it goes.
+    /// Follows the profile exactly, or stands still, without ever closing the switch; returns the way.
     fn searches(stage: &mut Stage, follows: bool) -> f32 {
         stage.home();
         let mut furthest = 0.0f32;
@@ -476,7 +478,7 @@ mod tests {
         found.home();
         assert_eq!(found.tick(0, true), Ok(0.0));
         assert!((searches(&mut found, true) - TOUCH_MM).abs() < 0.1);
-        // what was only searched is not known
+        // a place that was only searched is not known
         let mut found = new();
         found.home();
         assert_eq!(found.tick(0, true), Ok(0.0));

@@ -6,7 +6,7 @@
 /// Periods, and at most steps, per second.
 pub const BASE_HZ: u32 = 3200;
 
-/// What the next period has.
+/// The next period's pulse.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Period {
     /// A pulse, at its beginning.
@@ -43,7 +43,7 @@ impl Steps {
         self.steps
     }
 
-    /// A period begins; what the next one has, at a rate in steps/s, downwards positive.
+    /// Begins a period; returns the next one, at a rate in steps/s, downwards positive.
     pub fn begin(&mut self, rate: i32) -> Period {
         let pulses_now = self.pulse;
         if pulses_now {
@@ -117,7 +117,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn direction_is_stable_for_a_period_about_every_pulse(rates in proptest::collection::vec((-4000i32..4000, 1usize..40), 1..30)) {
+        fn direction_is_stable_for_a_period_about_every_pulse(
+            rates in proptest::collection::vec((-4000i32..4000, 1usize..40), 1..30),
+        ) {
             let mut steps = Steps::new();
             let mut made = 0;
             // DIR before the period, whether it has a pulse

@@ -1,20 +1,20 @@
-//! How long a movement may take. One that takes longer is stopped, and its finger is lifted before the error is reported.
+//! Longest time of a movement. One that takes longer is stopped, and its finger is lifted before the error is reported.
 
 /// A movement that takes longer than this does not end.
 const LONGEST_MS: u32 = 120_000;
 /// Stopping and lifting take less: the whole travel and a quarter are 10 s.
 const LIFTING_MS: u32 = 15_000;
 
-/// What to do with a movement that is waited for.
+/// The next action of the code that waits for a movement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Wait {
-    /// Go on waiting.
+    /// Keeps waiting.
     On,
-    /// Stop it, and go on waiting: the finger is being lifted.
+    /// Stops it and keeps waiting: the finger is being lifted.
     Stop,
     /// The rig is at rest.
     Over,
-    /// It did not come to an end by itself. It is at rest now, or does not even stop.
+    /// The movement did not end by itself. The rig is at rest now, or does not even stop.
     Hangs,
 }
 
@@ -35,7 +35,7 @@ impl Default for MovementTimeout {
 }
 
 impl MovementTimeout {
-    /// Another `ms` have passed, and the rig is at rest or is not.
+    /// Takes another `ms`, and whether the rig is at rest.
     pub fn wait(&mut self, ms: u32, at_rest: bool) -> Wait {
         if at_rest {
             return if self.stopped {

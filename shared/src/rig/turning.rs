@@ -1,4 +1,5 @@
-//! An accelerometer that is turned over: gravity along it one way and the other gives what a count of it is, and its zero.
+//! Calibration of an accelerometer by turning it over: gravity along it one way and the other gives the value of a
+//! count, and its zero.
 
 use core::ops::RangeInclusive;
 
@@ -6,15 +7,15 @@ use super::weigh::Still;
 use crate::sensor::PressureSensor as _;
 use crate::sensor::mems::Mems;
 
-/// A finger that points up or down feels at least so much of gravity, counts: one that lies on its side is not measured.
+/// Least gravity along a finger that points up or down, counts: one that lies on its side is not measured.
 const LEAST: f32 = 0.7 * COUNTS_PER_G;
-/// What it should be by the data sheet of the IIS3DWB.
+/// Value of a count in the data sheet of the IIS3DWB, mg.
 const MG_PER_COUNT: f32 = Mems::MODEL.calibration.pac_pa_per_count;
 const COUNTS_PER_G: f32 = 1e3 / MG_PER_COUNT;
-/// What a count can be, mg: within a tenth of the data sheet's (chosen, since its own limits could not be read). A finger that is
-/// turned over 15 degrees askew shows 3 % less.
+/// Plausible values of a count, mg: within a tenth of the data sheet's (chosen, since its own limits could not be
+/// read). A finger that is turned over 15 degrees askew shows 3 % less.
 pub const PLAUSIBLE_MG: RangeInclusive<f32> = 0.9 * MG_PER_COUNT..=1.1 * MG_PER_COUNT;
-/// How far its zero may be off, mg (chosen, for the same reason).
+/// Largest offset of its zero, mg (chosen, for the same reason).
 const MOST_OFFSET_MG: f32 = 250.0;
 
 /// First one way, then the other.
@@ -25,7 +26,7 @@ pub struct Turning {
 }
 
 impl Turning {
-    /// Whether it has been still the first way, and is to be turned over now.
+    /// Returns true if it has been still the first way, and is to be turned over now.
     pub fn wants_turn(&self) -> bool {
         self.first.is_some()
     }
@@ -45,12 +46,12 @@ impl Turning {
     }
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Turned {
     /// Counts of P_AC that 1 g makes.
     pub g_counts: f32,
-    /// What it says when it should say 0, counts.
+    /// Reading at 0 g, counts.
     pub offset_counts: f32,
 }
 
@@ -68,7 +69,7 @@ impl Turned {
 mod tests {
     use super::*;
 
-    /// What comes of gravity that is so, in g, for so many looks.
+    /// Takes gravity in g for so many looks each; returns the result.
     fn turn(ways: &[(f32, u32)]) -> (Turning, Option<Turned>) {
         let mut turning = Turning::default();
         let mut looks = 0u32;

@@ -2,13 +2,13 @@
 
 use super::calibration::{LineFit, RigCalibration, RigCalibrationError};
 
-/// Speeds of the runs, um/s, each there and back: from the slowest movement of the study to the fastest that most of the
-/// grid needs.
+/// Speeds of the runs, um/s, each there and back: from the slowest movement of the study to the fastest that most of
+/// the grid needs.
 pub const SPEEDS_UM_S: [u32; 4] = [10_000, 25_000, 40_000, 63_000];
 
 /// The runs that are made and those that are still to be made.
 ///
-/// Where the stage stands at first does not matter: of two runs at one speed one goes to the right, the way of every slide,
+/// The stage's place at first does not matter: of two runs at one speed one goes to the right, the way of every slide,
 /// and only that one counts.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct UnloadedRuns {
@@ -23,8 +23,8 @@ impl UnloadedRuns {
         SPEEDS_UM_S.get(self.made / 2).copied()
     }
 
-    /// Takes a run in: where the stage stood before and after it in mm, and its mean current in A; `None` if there was no
-    /// time at constant speed.
+    /// Takes a run in: where the stage stood before and after it in mm, and its mean current in A; `None` if there was
+    /// no time at constant speed.
     pub fn took(&mut self, from_mm: f32, to_mm: f32, mean_current_a: Option<f32>) {
         let Some(speed_um_s) = self.next_speed() else {
             return;
@@ -38,8 +38,8 @@ impl UnloadedRuns {
     /// `calibration` with the current that was measured.
     ///
     /// # Errors
-    /// [`RigCalibrationError::Points`] also before all runs are made; [`RigCalibrationError::NoLine`], and what
-    /// [`RigCalibration::check`] says.
+    /// [`RigCalibrationError::Points`] also before all runs are made; [`RigCalibrationError::NoLine`], and the errors
+    /// of [`RigCalibration::check`].
     #[inline]
     pub fn finish(
         &self,

@@ -1,4 +1,4 @@
-//! Known weights on the finger: when one lies still, and the force per count that they give.
+//! Known weights on the finger: the moment at which one lies still, and the force per count that they give.
 
 /// Looks in a second at P_DC under a weight.
 pub const LOOKS_HZ: u32 = 100;
@@ -6,12 +6,13 @@ pub const LOOKS_HZ: u32 = 100;
 const STILL: u32 = 3 * LOOKS_HZ / 2;
 /// Counts that P_DC may wander meanwhile, and the share of it.
 const WANDERS: (f32, f32) = (2.0, 0.04);
-/// A weight is there from this share of what it should give by the constants so far: a fingertip's are off by half at most.
+/// Share of its expected counts from which a weight is there: a fingertip's constants are off by half at most.
 const THERE: f32 = 0.4;
-/// A weight has been taken away when so much of it is left, mN: half of the least one, and far below what a rig's guard takes for a
-/// press on a finger that waits.
+/// Remainder at which a weight counts as taken away, mN: half of the least weight, and far below the rise that a rig's
+/// guard takes for a press on a finger that waits.
 const GONE_MN: f32 = 100.0;
-/// How far a weight may be off the line, mN: 3 g, since a kitchen scale shows whole ones, and the share of it (chosen).
+/// Largest deviation of a weight from the line, mN: 3 g, since a kitchen scale shows whole ones, and the share of it
+/// (chosen).
 const OFF: (f32, f32) = (30.0, 0.08);
 
 /// Waits for something to keep still.
@@ -68,18 +69,19 @@ impl Weighing {
         }
     }
 
-    /// Whether the weight is to be put on now.
+    /// Returns true if the weight is to be put on now.
     pub fn wants_weight(&self) -> bool {
         self.air.is_some()
     }
 
-    /// Whether P_DC says that the weight has been taken away again.
+    /// Returns true if P_DC shows that the weight has been taken away again.
     pub fn is_air(&self, counts: f32) -> bool {
         libm::fabsf(counts - self.air.unwrap_or_default()) < self.gone
     }
 
-    /// Takes P_DC, counts about that in the air as it was known before, [`LOOKS_HZ`] times a second. The weight's mean above the
-    /// air, once it has lain still; below 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
+    /// Takes P_DC, counts about that in the air as it was known before, [`LOOKS_HZ`] times a second. The weight's mean
+    /// above the air, once it has lain still; below 0 where P_DC falls under it, as that of a load cell that is wired
+    /// the wrong way round.
     pub fn take(&mut self, counts: f32) -> Option<f32> {
         let mean = self.still.take(counts)?;
         let above = mean - self.air.unwrap_or_default();
@@ -94,18 +96,18 @@ impl Weighing {
     }
 }
 
-/// What weights say of a finger.
+/// The force scale that weights give.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ForceScale {
     /// Contact force of a count of P_DC, mN.
     pub mn_per_count: f32,
-    /// How far the weight is off the line that is farthest off it, mN.
+    /// Largest deviation of a weight from the line, mN.
     pub off_mn: f32,
 }
 
 impl ForceScale {
-    /// The line through 0 that is nearest to these counts above the air and weights in mN; `None` where one of them is farther
-    /// off it than a scale and a hand explain, or where P_DC falls.
+    /// The line through 0 that is nearest to these counts above the air and weights in mN; `None` if one of them is
+    /// farther off it than a scale and a hand explain, or if P_DC falls.
     pub fn of(points: &[(f32, f32)]) -> Option<Self> {
         let (mut xy, mut xx) = (0.0, 0.0);
         for (x, y) in points {
@@ -134,7 +136,7 @@ impl ForceScale {
 mod tests {
     use super::*;
 
-    /// What comes of P_DC that is so for as many looks.
+    /// Takes P_DC at each level for so many looks; returns the weight.
     fn weigh(mut weighing: Weighing, levels: &[(f32, u32)]) -> Option<f32> {
         let mut looks = 0u32;
         let mut each = levels
@@ -189,9 +191,9 @@ mod tests {
         // the third is 20 mN too light
         let scale = of([29.4, 58.8, 90.3, 117.7, 147.1]).unwrap();
         assert!((10.0..20.0).contains(&scale.off_mn), "{scale:?}");
-        // 3 g of 30 are a scale's, and no wrong weight
+        // 3 g of 30 are a scale's error, and no wrong weight
         assert!(of([31.9, 58.8, 88.3, 117.7, 147.1]).is_some());
-        // the third was laid on twice; the fourth is a third heavier than it says
+        // the third was laid on twice; the fourth is a third heavier than its label
         assert_eq!(of([29.4, 58.8, 88.3, 88.3, 147.1]), None);
         assert_eq!(of([29.4, 58.8, 88.3, 157.0, 147.1]), None);
         assert_eq!(of([-29.4, -58.8, -88.3, -117.7, -147.1]), None);

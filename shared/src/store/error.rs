@@ -119,13 +119,13 @@ pub enum SettingsError {
     Corrupt,
     /// They were written by another version: erase them.
     #[error(
-        "the settings are of version {0}, and this program knows {SCHEMA}: erase them, and calibrate again"
+        "the settings are of version {0}, and this program knows version {SCHEMA}: erase them, and calibrate again"
     )]
     Schema(u16),
     /// No space for more progress of training: delete a texture.
     #[error("no room for more unfinished training: finish or forget a texture")]
     Full,
-    /// A record of this kind is damaged, the one before it is in force. New in version 6.
+    /// A record of this kind is damaged, the one before it is in force.
     #[error("a stored record is damaged, and the one before it is in its place: {0}")]
     Record(Setting),
 }

@@ -21,7 +21,7 @@ pub const SECTORS: [(u32, u32); 6] = [
 /// All of them.
 pub(super) const UNITS: usize = 16;
 /// Version of the records and of the map they are in (`sequential-storage` 8).
-pub const SCHEMA: u16 = 2;
+pub const SCHEMA: u16 = 1;
 pub(super) const MAGIC: u32 = u32::from_le_bytes(*b"SLOT");
 pub(super) const LAYOUT: u32 = 1;
 pub(super) const COMMIT: u32 = u32::from_le_bytes(*b"COMM");

@@ -4,8 +4,8 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::error::StoreError;
 use super::layout::{
-    COMMIT, COMMIT_AT, Correct, HEADER, Push, Slot, StoredTable, TABLE_AT, WORD, header,
-    is_committed,
+    COMMIT, COMMIT_AT, Correct, HEADER, LAYOUT, MAGIC, Push, Slot, StoredTable, TABLE_AT, WORD,
+    header, is_committed,
 };
 use super::sectors::Store;
 use crate::CRC32;
@@ -249,15 +249,16 @@ impl<F: NorFlash> Store<F> {
                 |_: &mut _| ()
             };
             let header = self.slot_header(slot, correct).await?;
-            if let Ok(table) = &header {
+            if let Ok((table, _)) = &header {
                 self.slots.generation = self.slots.generation.max(table.generation);
             }
             if !is_committed {
                 continue;
             }
-            let generation = header.as_ref().ok().map(|table| table.generation);
+            let generation = header.as_ref().ok().map(|(table, _)| table.generation);
             let whole = match header {
-                Ok(table) => self.whole(table).await?,
+                Ok((_, layout)) if layout != LAYOUT => Err(TableError::Version(layout as u16)),
+                Ok((table, _)) => self.whole(table).await?,
                 Err(why) => Err(why),
             };
             match whole {
@@ -281,12 +282,12 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// What the header of a slot says, if it is one.
+    /// What the header of a slot says, and the version of its layout, if it is one.
     async fn slot_header(
         &mut self,
         slot: Slot,
         correct: Correct,
-    ) -> Result<Result<StoredTable, TableError>, StoreError> {
+    ) -> Result<Result<(StoredTable, u32), TableError>, StoreError> {
         let start = slot.start::<F>();
         let mut bytes = [0; HEADER];
         self.read(start, &mut bytes).await?;
@@ -297,20 +298,19 @@ impl<F: NorFlash> Store<F> {
             .iter()
             .map(|word| u32::from_le_bytes(*word));
         let mut word = || words.next().unwrap_or_default();
-        let (_, _, generation, length, crc) = (word(), word(), word(), word(), word());
-        let stored = word();
+        let [magic, layout, generation, length, crc, stored] = core::array::from_fn(|_| word());
         let table = StoredTable {
             offset: start + TABLE_AT,
             length: length as usize,
             crc,
             generation,
         };
-        let good = header(&table);
-        Ok(if bytes == good && table.length <= slot.capacity::<F>() {
-            Ok(table)
+        let (body, _) = bytes.split_at(HEADER - WORD);
+        let computed = CRC32.checksum(body);
+        let is_whole = magic == MAGIC && stored == computed;
+        Ok(if is_whole && table.length <= slot.capacity::<F>() {
+            Ok((table, layout))
         } else {
-            let [.., a, b, c, d] = good;
-            let computed = u32::from_le_bytes([a, b, c, d]);
             Err(TableError::Crc { stored, computed })
         })
     }

@@ -5,8 +5,8 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, EARLY_VERSION, LENGTH, MAGIC, MAX_MOVEMENTS,
-    PACED_VERSION, PLAIN_VERSION, SLOPES, TableError, Tally, VERSION, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, LENGTH, MAGIC, MAX_MOVEMENTS, SLOPES, TableError,
+    Tally, VERSION,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
 use super::sections::Sections;
@@ -494,11 +494,6 @@ fn write<'o, 'a>(
         (n + 1, names + 1 + row.name.len())
     });
     let length = encoded_len(contents, count, movements.len(), names) + of_sections;
-    let version = if of_sections > 0 {
-        VERSION
-    } else {
-        PLAIN_VERSION
-    };
     let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
         return Err(EncodeError::NoSpace(length));
     };
@@ -512,7 +507,7 @@ fn write<'o, 'a>(
     };
     let [code, what, features] = contents.codes();
     writer.put(&MAGIC);
-    writer.put(&version.to_le_bytes());
+    writer.put(&VERSION.to_le_bytes());
     writer.put(&[code, what]);
     writer.put(&length_field.to_le_bytes());
     writer.put(&count.to_le_bytes());
@@ -545,22 +540,7 @@ fn write<'o, 'a>(
         writer.put(&[u8::try_from(row.name.len()).map_err(|_| EncodeError::Name(index))?]);
         writer.put(row.name.as_bytes());
     }
-    let names_end = writer.at;
     sections(&mut writer);
-    let written = writer.buffer.get(names_end..writer.at).unwrap_or_default();
-    let has = |wanted| each(written).flatten().any(|(kind, _)| kind == wanted);
-    let newer = if has(SLOPES) {
-        Some(PACED_VERSION)
-    } else if has(LENGTH) {
-        Some(EARLY_VERSION)
-    } else {
-        None
-    };
-    if let Some(version) = newer {
-        writer.at = MAGIC.len();
-        writer.put(&version.to_le_bytes());
-        writer.at = names_end + of_sections;
-    }
     let crc = CRC32.checksum(writer.written());
     writer.put(&crc.to_le_bytes());
     Table::read(writer.buffer).map_err(EncodeError::Invalid)

@@ -1,6 +1,6 @@
 //! The finger that a table was learned with: bands and pressures of two kinds of fingers cannot be compared.
 //!
-//! Section of kind 5; a table without it was learned with a BioTac, as all were before there was another finger.
+//! Section of kind 5; a table without it was learned with a BioTac.
 //!
 //! | bytes | what |
 //! |---|---|

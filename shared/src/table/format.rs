@@ -10,16 +10,10 @@ use crate::features::{FeatureSet, MovementError, Property, PropertySet};
 use crate::sensor::FingerCode;
 
 pub(super) const MAGIC: [u8; 4] = *b"TACT";
-/// Version of the binary form of tables with sections.
-pub const VERSION: u16 = 4;
-/// Version of those that know speeds, which is the same otherwise.
-pub(super) const PACED_VERSION: u16 = 5;
-/// Version of those without sections, which is the same otherwise.
-pub(super) const PLAIN_VERSION: u16 = 3;
+/// Version of the binary form.
+pub const VERSION: u16 = 1;
 /// The kind of the section that has them.
 pub(super) const SLOPES: u16 = 4;
-/// Version of those that know what slides say before their end, which is the same otherwise.
-pub(super) const EARLY_VERSION: u16 = 6;
 /// Bytes of a section's kind and length.
 pub(super) const HEAD: usize = 4;
 /// The kind of the section of drift, and bytes of its two numbers.
@@ -148,7 +142,7 @@ pub enum TableError {
     Sections,
     /// A section of this kind is damaged, there twice, or not for such a table.
     Section(u16),
-    /// It was learned with another finger than the probe has. New in version 8 of the messages.
+    /// It was learned with another finger than the probe has.
     Finger {
         /// The table's.
         table: FingerCode,
@@ -167,12 +161,11 @@ impl fmt::Display for TableError {
                 f,
                 "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
             ),
-            Self::Version(found) => {
-                write!(
-                    f,
-                    "version {found}, and this program reads versions {PLAIN_VERSION} to {EARLY_VERSION}: learn the table anew"
-                )
-            }
+            Self::Version(found) => write!(
+                f,
+                "version {found}, and this program reads version {VERSION}: learn the table anew, or use the program \
+                 that wrote it"
+            ),
             Self::Method(found) => write!(f, "method {found} is unknown to this program"),
             Self::Length { header, contents } => {
                 write!(

@@ -16,10 +16,8 @@ pub const fn mean_step(property: Property) -> f32 {
     }
 }
 
-/// The expected distribution of one property of a texture (eq. 4). The order of the fields is fixed, for kernels that
-/// are not written in Rust.
+/// The expectation of one property of a texture (eq. 4).
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[repr(C)]
 pub struct Gaussian {
     /// Mean, in the unit of the property.
     pub mean: f32,
@@ -60,16 +58,6 @@ impl<'t> Gaussians<'t> {
             let &[m0, m1, s0, s1] = cell.first_chunk()?;
             Some([u16::from_le_bytes([m0, m1]), u16::from_le_bytes([s0, s1])])
         })
-    }
-
-    /// The bytes of the cells, the first at the beginning, and how far one is from the next.
-    pub fn bytes(&self) -> (&'t [u8], usize) {
-        (self.cells, self.stride)
-    }
-
-    /// One step of the means, in the unit of the property.
-    pub fn step(&self) -> f32 {
-        self.step
     }
 
     /// The factor from (steps of the means / steps of the standard deviation) to numbers whose square is half of that

@@ -22,7 +22,8 @@ use super::view::Table;
 /// Most lengths of a table.
 pub const MAX_LENGTHS: usize = 6;
 const _: () = assert!((MAX_LENGTHS + 1) * MAX_MOVEMENTS <= u8::MAX as usize);
-/// The offset of the number of textures in the header.
+/// Where the header has the length of the table, and where the number of textures behind it.
+const LENGTH_FIELD: usize = 8;
 const COUNT: usize = 12;
 
 /// The table of slides of one length, for [`with_lengths`].
@@ -158,8 +159,7 @@ impl<'a> Table<'a> {
                 .rest
                 .split_at_checked(drift.unwrap_or(0))
                 .unwrap_or_default();
-            let fits = same(0, 4)
-                && same(6, 8)
+            let fits = same(0, LENGTH_FIELD)
                 && same(COUNT, HEADER)
                 && same(HEADER, self.layout().whitenings)
                 && length.ms > longest

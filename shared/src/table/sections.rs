@@ -124,7 +124,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// The drift that the table was made for; `None` for one that does not say, of an older version.
+    /// Returns how much drift the table was made for; `None` for a table of Gaussians.
     pub fn drift(&self) -> Option<Drift> {
         let section = self.section(DRIFT)?;
         Some(Drift {
@@ -143,8 +143,8 @@ impl<'a> Table<'a> {
         self.drifts.get(at..at + bytes).map(Numbers::new)
     }
 
-    /// From which scores on a texture is new, or has changed; `None` for a table that is not calibrated: of an older
-    /// version, or of fewer than three textures when it was made.
+    /// Returns from which scores on a texture is new, or has changed; `None` for a table that is not calibrated: one of
+    /// Gaussians, or of fewer than three textures when it was made.
     pub fn limits(&self) -> Option<Limits> {
         Limits::read(self.novelty.get(..Limits::BYTES)?)
     }

@@ -108,7 +108,7 @@ const MOVEMENTS: [Movement; 2] = [Movement::FOR_TRACTION, Movement::FOR_ROUGHNES
 /// Two textures and two movements, all properties, field by field as the module's page has it: movements begin at byte
 /// 16, cells at 28, trials at 76, the lineage at 80, numbers and tallies at 84, names at 94.
 fn small() -> Vec<u8> {
-    let mut bytes = b"TACT\x03\0\0\x07\x6b\0\0\0\x02\0\x02\0".to_vec();
+    let mut bytes = b"TACT\x01\0\0\x07\x6b\0\0\0\x02\0\x02\0".to_vec();
     bytes.extend(b"\xee\x04\x10\x27\0\0"); // 1262 mN, 10000 um/s
     bytes.extend(b"\xc8\0\x78\xf6\0\0"); // 200 mN, 63096 um/s
     bytes.extend(b"\0\x10\0\x20\0\xf0\0\x30\0\x20\0\x40"); // felt, 1: means 1, -2, 2; sd 1/2, 3/4, 1

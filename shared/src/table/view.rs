@@ -1,13 +1,12 @@
 //! Reading a table where it is stored.
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, EARLY_VERSION, HEADER, LABEL_BYTES, LENGTH,
-    Layout, MAGIC, MAX_MOVEMENTS, MOVEMENT_BYTES, MS, PACED_VERSION, PLAIN_VERSION, SLOPES, TWO,
-    TableError, Tally, VERSION, array, each,
+    Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, HEADER, LABEL_BYTES, LENGTH, Layout, MAGIC,
+    MAX_MOVEMENTS, MOVEMENT_BYTES, MS, TWO, TableError, Tally, VERSION, array, each,
 };
 use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
 use super::training_stats::Whitened;
-use super::whitening::{Column, Row, View, Whitening, Words};
+use super::whitening::{Column, View, Whitening};
 use crate::CRC32;
 use crate::features::{MAX_FEATURES, Movement, Property, PropertySet, Vector};
 
@@ -72,9 +71,7 @@ impl<'a> Table<'a> {
             return Err(TableError::Magic([m0, m1, m2, m3]));
         }
         let version = u16::from_le_bytes([v0, v1]);
-        let paced = version == PACED_VERSION;
-        let early = version == EARLY_VERSION;
-        if version != VERSION && version != PLAIN_VERSION && !paced && !early {
+        if version != VERSION {
             return Err(TableError::Version(version));
         }
         let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
@@ -104,19 +101,11 @@ impl<'a> Table<'a> {
         };
         let end = table.check()?;
         table.sections = body.get(end..).unwrap_or_default();
-        if version == PLAIN_VERSION && !table.sections.is_empty() {
-            return Err(TableError::Length {
-                header: length,
-                contents: end + CRC_BYTES,
-            });
-        }
         table.check_sections()?;
         table.find_sections();
-        if paced == table.slopes.is_empty() {
-            return Err(TableError::Section(SLOPES));
-        }
-        let is_early = table.count_lengths().map(|lengths| lengths > 0);
-        if is_early != Some(early) || early && table.is_paced() {
+        let lengths = table.count_lengths();
+        let lengths = lengths.ok_or(TableError::Section(LENGTH))?;
+        if lengths > 0 && table.is_paced() {
             return Err(TableError::Section(LENGTH));
         }
         Ok(table)
@@ -519,17 +508,6 @@ impl<'a> Table<'a> {
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
         let (bytes, known) = self.bytes_from_whitening(movement)?;
         Some(View::checked(bytes, known).apply(features))
-    }
-
-    /// As [`Table::whiten`], with other code for the products.
-    pub(crate) fn whiten_by(
-        &self,
-        movement: u8,
-        features: &[i16],
-        products: fn(&Row, &Words) -> i64,
-    ) -> Option<Vector> {
-        let (bytes, known) = self.bytes_from_whitening(movement)?;
-        Some(View::checked(bytes, known).apply_by(features, products))
     }
 
     fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {

@@ -5,7 +5,6 @@
 
 use heapless::Vec;
 
-use super::PAIRS;
 use crate::features::{FEATURE_STEPS, MAX_FEATURES, Vector, WHITE_STEPS};
 
 /// From features to whitened ones, z = W (x - g): canonical variates. W' W is the inverse of the covariance of slides
@@ -121,8 +120,7 @@ impl<'b> View<'b> {
         places.iter().all(|&p| p <= 30).then_some(view)
     }
 
-    /// Of bytes that begin with what [`View::new`] has found to be one. Of those behind it two may be read: a row is
-    /// taken as long as the longest.
+    /// Of bytes that [`View::new`] has found to be one.
     pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
         Self { features, bytes }
     }
@@ -138,102 +136,28 @@ impl<'b> View<'b> {
     }
 
     /// As [`Whitening::apply`].
-    pub(crate) fn apply(&self, features: &[i16]) -> Vector {
-        self.apply_by(features, products)
-    }
-
-    /// As [`Whitening::apply`], with other code for [`products`].
     #[inline(never)]
-    pub(crate) fn apply_by(&self, features: &[i16], products: fn(&Row, &Words) -> i64) -> Vector {
+    pub(crate) fn apply(&self, features: &[i16]) -> Vector {
         let [mean, places, rows] = self.parts();
         // beyond 32 units all features are alike; those that the table does not have are 0
-        let mut apart = [[0; 2]; MAX_FEATURES / 2];
+        let mut apart = [0; MAX_FEATURES];
         let known = features.iter().zip(mean.as_chunks().0);
-        for (apart, (x, g)) in apart.as_flattened_mut().iter_mut().zip(known) {
+        for (apart, (x, g)) in apart.iter_mut().zip(known) {
             *apart = x.saturating_sub(i16::from_le_bytes(*g));
         }
-        let [p, q, r, s, t, u, v] = apart;
-        let (p, q, r, s) = (pair(p), pair(q), pair(r), pair(s));
-        let apart = [p, q, r, s, pair(t), pair(u), pair(v)];
-        // one a row: pushed each for itself they would be counted each time
-        let mut white = Vector::new();
-        let _ = white.resize(self.features, 0);
-        let mut rest = rows;
-        for (white, &places) in white.iter_mut().zip(places) {
-            let filled;
-            let row = match rest.first_chunk() {
-                Some(row) => row,
-                // the last of a table
-                None => {
-                    filled = fill(rest);
-                    &filled
-                }
-            };
-            // what follows the row is multiplied by 0
-            *white = rounded(products(row, &apart), places);
-            match rest.get(2 * self.features..) {
-                Some(next) => rest = next,
-                None => break,
-            }
-        }
-        white
+        let rows = rows.chunks_exact((2 * self.features).max(1)).zip(places);
+        let white = rows.map(|(row, places)| rounded(product(row, &apart), *places));
+        // no more rows than features
+        white.collect()
     }
 }
-
-/// As many bytes as the most features take, 0 beyond those that there are.
-#[cold]
-#[inline(never)]
-pub(crate) fn fill(bytes: &[u8]) -> Row {
-    let mut filled = [0; 2 * MAX_FEATURES];
-    for (to, from) in filled.iter_mut().zip(bytes) {
-        *to = *from;
-    }
-    filled
-}
-
-/// A row of a whitening where its table lies, or what it is multiplied with: as many numbers as the most features, two
-/// to a word.
-pub type Row = [u8; 2 * MAX_FEATURES];
-/// Numbers of 16 bits, two to a word, the first in the low half.
-pub type Words = [u32; PAIRS];
 
 /// The sum of the products of the numbers of a row with others.
-#[inline(never)]
-pub(crate) fn products(row: &Row, others: &Words) -> i64 {
-    let ([a, b, c, d, e, f, g], [p, q, r, s, t, u, v]) = (words(row), *others);
-    let sum = dot(dot(dot(dot(0, a, p), b, q), c, r), d, s);
-    dot(dot(dot(sum, e, t), f, u), g, v)
-}
-
-/// Two numbers of 16 bits to a word. Not by a loop: a compiler that saves space would keep it, and take twice as long.
-#[inline(always)]
-pub(crate) fn words(bytes: &Row) -> Words {
-    let ([a, b, c, d, e, f, g], []) = bytes.as_chunks() else {
-        return [0; PAIRS];
-    };
-    [
-        u32::from_le_bytes(*a),
-        u32::from_le_bytes(*b),
-        u32::from_le_bytes(*c),
-        u32::from_le_bytes(*d),
-        u32::from_le_bytes(*e),
-        u32::from_le_bytes(*f),
-        u32::from_le_bytes(*g),
-    ]
-}
-
-/// Two numbers of 16 bits in a word, as the chip multiplies them.
-#[inline(always)]
-fn pair([low, high]: [i16; 2]) -> u32 {
-    u32::from(high as u16) << 16 | u32::from(low as u16)
-}
-
-/// Adds the products of two pairs to a sum; the chip has one instruction for it.
-#[inline(always)]
-pub(crate) fn dot(sum: i64, a: u32, b: u32) -> i64 {
-    let low = i32::from(a as i16) * i32::from(b as i16);
-    let high = ((a as i32) >> 16) * ((b as i32) >> 16);
-    sum + i64::from(low) + i64::from(high)
+#[inline]
+fn product(row: &[u8], others: &[i16; MAX_FEATURES]) -> i64 {
+    let pairs = row.as_chunks().0.iter().zip(others);
+    let products = pairs.map(|(w, x)| i32::from(i16::from_le_bytes(*w)) * i32::from(*x));
+    products.map(i64::from).sum()
 }
 
 /// Products of features, in 1/1024 of a unit, and weights of so many binary places, 30 at most, to the nearest 1/256.

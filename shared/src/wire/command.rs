@@ -16,7 +16,6 @@ pub struct Request {
     /// Comes back in the answer.
     pub id: u16,
     /// What is asked for.
-    #[serde(alias = "ask")]
     pub command: Command,
 }
 
@@ -34,7 +33,6 @@ pub enum Command {
     Identify(Identify),
     /// The label of the texture in the last exploration: one of the textures known, or a new one. The probe learns it from
     /// the slides of that exploration.
-    #[serde(alias = "Answer")]
     Label(Name),
     /// Learns what lies under the finger.
     Train(Train),
@@ -74,18 +72,18 @@ pub enum Command {
     /// Measures P_DC under a weight of so many mN that a person puts on the finger: [`super::Event::Weighed`].
     Weigh(u16),
     /// Finds out whether what lies under the finger is the one texture it is among: [`super::Event::Verified`] after every
-    /// slide, and no verdict. New in version 6.
+    /// slide, and no verdict.
     Verify(Identify),
     /// Keeps the share of false alarms that limits are for, where a request does not say otherwise; `None`: each table's
-    /// own. New in version 6.
+    /// own.
     SetFalseAlarm(Option<f32>),
     /// Keeps whether movements may press with up to 2 N: only for a finger whose mount yields, or whose lever is stopped, before
-    /// 2.2 N. New in version 7.
+    /// 2.2 N.
     SetHighForce(bool),
-    /// Measures gravity along a finger with an accelerometer, which a person turns over: [`super::Event::Turned`]. New in version 10.
+    /// Measures gravity along a finger with an accelerometer, which a person turns over: [`super::Event::Turned`].
     TurnOver,
     /// An arm that moves the finger says how far it has come with what [`super::Event::Arm`] asked for: whenever that changes, and at
-    /// least every 100 ms while it is open. Only a probe that an arm moves takes it, at any time. New in version 11.
+    /// least every 100 ms while it is open. Only a probe that an arm moves takes it, at any time.
     Arm(ArmReport),
 }
 
@@ -109,8 +107,7 @@ pub struct Identify {
     /// For random choices, and for where on the sample slides begin.
     pub seed: u32,
     /// Share of the known textures that may be taken for new ones; that of the probe's settings, or the
-    /// table's own, unless given. New in version 5.
-    #[serde(default)]
+    /// table's own, unless given.
     pub false_alarm: Option<f32>,
 }
 
@@ -152,7 +149,6 @@ pub enum Forget {
     /// A texture, whether the probe learned it from the user or by itself.
     Texture(Name),
     /// All that the probe has learned by itself: the table is again as the user trained it.
-    #[serde(alias = "SelfTaught")]
     SelfLearned,
     /// The unfinished training of a texture, or a finished pilot.
     Training(Name),

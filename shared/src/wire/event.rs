@@ -4,7 +4,7 @@ use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 use super::command::PART;
-use super::failure::{self, Failure};
+use super::failure::Failure;
 use super::prompt::Prompt;
 use super::sparse;
 use super::text::Text;
@@ -28,7 +28,6 @@ pub struct Report {
     /// Since the probe booted, ms.
     pub at_ms: u32,
     /// What happened.
-    #[serde(alias = "tell")]
     pub event: Event,
 }
 
@@ -46,8 +45,7 @@ pub enum Event {
         reset: Reset,
         /// Why the firmware gave up before the reset, if it did.
         last_words: Option<Text>,
-        /// Its finger. New in version 8.
-        #[serde(default)]
+        /// Its finger.
         finger: FingerCode,
     },
     /// Answer to [`super::Command::Status`].
@@ -59,7 +57,6 @@ pub enum Event {
         /// Its number.
         id: u16,
         /// Why, and what to do next.
-        #[serde(deserialize_with = "failure::deserialize")]
         why: Failure,
     },
     /// A frame was damaged; so many were since the probe booted.
@@ -75,18 +72,15 @@ pub enum Event {
         /// What is looked at.
         action: Action,
         /// Expected outcomes of the best actions, best first.
-        #[serde(alias = "outlook")]
         expected: Vec<ExpectedOutcome, MAX_EXPECTED_OUTCOMES>,
     },
     /// The slide was made and taken in.
-    #[serde(alias = "Felt")]
     SlideReport {
         /// Number of the slide, from 1.
         slide: u8,
         /// What was looked at.
         action: Action,
         /// What was measured.
-        #[serde(alias = "felt")]
         observed: SlideReport,
         /// Probability of every texture of the table. On the line only those of a millionth or more: the others are 0
         /// there.
@@ -98,16 +92,13 @@ pub enum Event {
         /// Number of the slide, from 1.
         slide: u8,
         /// Why.
-        #[serde(deserialize_with = "failure::deserialize")]
         why: Failure,
     },
     /// What lies under the finger.
     Verdict(Verdict),
     /// The probe has learned a texture from the slides of an exploration.
-    #[serde(alias = "Taught")]
     TextureLearned(TextureLearned),
     /// A movement of a texture that is learned was made.
-    #[serde(alias = "Learned")]
     TrainingSlide {
         /// The movement.
         movement: Movement,
@@ -116,7 +107,6 @@ pub enum Event {
         /// Trials to come after it, of all movements.
         left: u16,
         /// What was measured.
-        #[serde(alias = "felt")]
         observed: SlideReport,
     },
     /// What the rig is at, 20 times a second while it moves.
@@ -149,17 +139,14 @@ pub enum Event {
         /// Counts above that of the lifted finger.
         counts: f32,
     },
-    /// Whether it is the texture asked for, after so many slides. New in version 6.
+    /// Whether it is the texture asked for, after so many slides.
     Verified {
         /// Slides that counted.
         slides: u8,
         /// What they say.
         now: Verification,
     },
-    /// How fast the slide was whose report comes next, where the probe measured it: natural logarithm of its speed in parts of the
-    /// movement's, in steps of 1/1024. New in version 9.
-    Pace(i16),
-    /// What an accelerometer felt that was turned over. New in version 10.
+    /// What an accelerometer felt that was turned over.
     Turned {
         /// Counts of P_AC that 1 g makes.
         g_counts: f32,
@@ -167,10 +154,10 @@ pub enum Event {
         offset_counts: f32,
     },
     /// The slide whose report comes next ended early, after so many ms at constant speed, for the verdict is certain: it is reported
-    /// as it was then. New in version 10.
+    /// as it was then.
     Early(u16),
     /// The arm that moves the finger is to do this, in the place of what it does; said again until the arm answers, with
-    /// [`super::Command::Arm`]. New in version 11.
+    /// [`super::Command::Arm`].
     Arm(ArmOrder),
 }
 
@@ -253,14 +240,11 @@ pub struct Status {
     pub counts: Counts,
     /// Work that the skin has seen, mJ, and that part of it that wears.
     pub skin_mj: (u32, u32),
-    /// Share of false alarms that limits are for, if it was set: see [`super::Command::SetFalseAlarm`]. New in version 6.
-    #[serde(default)]
+    /// Share of false alarms that limits are for, if it was set: see [`super::Command::SetFalseAlarm`].
     pub false_alarm: Option<f32>,
-    /// Whether movements may press with up to 2 N: see [`super::Command::SetHighForce`]. New in version 7.
-    #[serde(default)]
+    /// Whether movements may press with up to 2 N: see [`super::Command::SetHighForce`].
     pub high_force: bool,
-    /// The finger that the firmware is for. New in version 8.
-    #[serde(default)]
+    /// The finger that the firmware is for.
     pub finger: FingerCode,
 }
 
@@ -296,6 +280,8 @@ pub struct SlideReport {
     pub bands: Vec<i16, FUSED_BANDS>,
     /// Mean and standard deviation of P_DC, in steps of 1/1024 of 100 counts.
     pub pressure: Option<[i16; 2]>,
+    /// Natural logarithm of the speed in parts of the movement's, in steps of 1/1024, where the probe measured it.
+    pub pace: Option<i16>,
 }
 
 impl SlideReport {
@@ -310,7 +296,7 @@ impl SlideReport {
             properties: self.properties(),
             bands: self.bands.clone(),
             pressure: self.pressure,
-            pace: None,
+            pace: self.pace,
         }
     }
 }
@@ -321,7 +307,7 @@ impl From<&Measurement> for SlideReport {
             properties,
             bands,
             pressure,
-            pace: _,
+            pace,
         } = slide.into();
         Self {
             properties: Property::ALL.map(|p| properties.get(p)),
@@ -329,6 +315,7 @@ impl From<&Measurement> for SlideReport {
             background: slide.background,
             bands,
             pressure,
+            pace,
         }
     }
 }
@@ -351,10 +338,8 @@ pub struct Verdict {
     /// Slides that counted.
     pub slides: u8,
     /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
-    #[serde(alias = "asks")]
     pub wants_label: bool,
-    /// Whether it is the texture named, but not as it was learned. New in version 5.
-    #[serde(default)]
+    /// Whether it is the texture named, but not as it was learned.
     pub changed: bool,
 }
 

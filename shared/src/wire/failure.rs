@@ -3,11 +3,9 @@
 
 use core::fmt;
 
-use serde::de::value::{MapAccessDeserializer, StrDeserializer};
-use serde::de::{MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
-use super::text::{Text, text};
+use super::text::Text;
 use crate::explorer::{ExplorerError, ObserveError};
 use crate::features::{FeatureSet, Movement, Property, SlideError};
 use crate::rig::calibration::RigCalibrationError;
@@ -133,10 +131,10 @@ pub enum MemoryError {
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The table that was stored cannot be read: the firmware's own is in force instead. New in version 5.
+    /// The table that was stored cannot be read: the firmware's own is in force instead.
     #[error("the stored table cannot be read, and that of the firmware is in its place: {0}")]
     StoredTable(TableError),
-    /// The newest table that was stored is damaged: the one before it is in force instead. New in version 5.
+    /// The newest table that was stored is damaged: the one before it is in force instead.
     #[error("the stored table cannot be read, and the one stored before it is in its place: {0}")]
     NewestTable(TableError),
 }
@@ -161,7 +159,7 @@ pub enum Rejection<E = RigError> {
 /// Why a request was not done, or what went wrong meanwhile.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum Failure {
-    /// In a sentence, as logs of [`PROTOCOL`](super::PROTOCOL) 3 have it.
+    /// Says in a sentence for what there is no other word: a sensor that does not start says so.
     #[error("{0}")]
     Said(Text),
     /// Something else is being done.
@@ -196,7 +194,7 @@ pub enum Failure {
     #[error(transparent)]
     Calibration(#[from] RigCalibrationError),
     /// A calibration of another length.
-    #[error("a calibration has 60 or 64 bytes")]
+    #[error("a calibration has 64 bytes")]
     CalibrationLength,
     /// The table ends before the byte that was asked for.
     #[error("the table has no such byte")]
@@ -207,12 +205,12 @@ pub enum Failure {
     /// This kind of probe cannot do that.
     #[error("this kind of probe cannot do that")]
     OtherProbe,
-    /// The table has no limits by which slides would be called different. New in version 6.
+    /// The table has no limits by which slides would be called different.
     #[error(
         "the table has no limits, by which slides would be called different: learn it again, with --method fused"
     )]
     NoLimits,
-    /// A share of false alarms that is none, or that no limit can be for. New in version 6.
+    /// A share of false alarms that is none, or that no limit can be for.
     #[error("the share of false alarms must be from 0.0005 to 0.2")]
     FalseAlarm,
 }
@@ -230,31 +228,5 @@ fn uncounted(why: &Rejection, f: &mut fmt::Formatter<'_>) -> fmt::Result {
 impl From<StoreError> for Failure {
     fn from(why: StoreError) -> Self {
         Self::Memory(why.into())
-    }
-}
-
-/// Reads a failure, which in an old log is a sentence.
-pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Failure, D::Error> {
-    struct Logged;
-    impl<'de> Visitor<'de> for Logged {
-        type Value = Failure;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a reason or a sentence")
-        }
-
-        fn visit_str<E: serde::de::Error>(self, sentence: &str) -> Result<Failure, E> {
-            let reason = Failure::deserialize(StrDeserializer::<E>::new(sentence));
-            Ok(reason.unwrap_or_else(|_| Failure::Said(text(sentence))))
-        }
-
-        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Failure, A::Error> {
-            Failure::deserialize(MapAccessDeserializer::new(map))
-        }
-    }
-    if deserializer.is_human_readable() {
-        deserializer.deserialize_any(Logged)
-    } else {
-        Failure::deserialize(deserializer)
     }
 }

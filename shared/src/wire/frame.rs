@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use crate::CRC32;
 
 /// Version of the messages. The two ends must have the same.
-pub const PROTOCOL: u8 = 11;
+pub const PROTOCOL: u8 = 1;
 /// Longest message, bytes.
 pub const MAX_MESSAGE: usize = 768;
 /// Longest frame without its closing 0: message, CRC, and what COBS adds, a byte and one for every 254.

@@ -51,9 +51,9 @@ pub enum Prompt {
     Again(Again),
     /// Put a weight of so many mN on the finger and keep it still.
     Weigh(u16),
-    /// Keep the finger still, pointing straight down or up. New in version 10.
+    /// Keep the finger still, pointing straight down or up.
     Still,
-    /// Turn the finger over, so that it points the other way, and keep it still. New in version 10.
+    /// Turn the finger over, so that it points the other way, and keep it still.
     TurnOver,
 }
 

@@ -45,6 +45,7 @@ fn longest() -> vec::Vec<Report> {
         background: 2.2,
         bands: Vec::from_slice(&[i16::MIN; FUSED_BANDS]).unwrap(),
         pressure: Some([i16::MAX, i16::MIN]),
+        pace: Some(i16::MIN),
     };
     let outcome = ExpectedOutcome {
         action,
@@ -368,11 +369,13 @@ fn a_slide_report_goes_both_ways() {
         background: 1.0,
         bands: Vec::from_slice(&[-3, 5]).unwrap(),
         pressure: Some([7, 8]),
+        pace: Some(-9),
     };
     let observation = observed.observation();
     assert_eq!(observation.properties, Properties::new(observed.properties));
     assert_eq!(observation.bands, [-3, 5]);
     assert_eq!(observation.pressure, Some([7, 8]));
+    assert_eq!(observation.pace, Some(-9));
     let measured = observed.properties().measured();
     let expected: PropertySet = [Property::Roughness, Property::Fineness]
         .into_iter()

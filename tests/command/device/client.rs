@@ -118,7 +118,6 @@ fn reports() -> Vec<Report> {
         },
         Event::Prompt(Prompt::Again(Again::TooUneven)),
         Event::Prompt(Prompt::Weigh(882)),
-        Event::Pace(-1024),
         Event::Early(500),
         Event::Pdc((-300..-280).collect()),
     ];

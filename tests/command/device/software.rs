@@ -195,7 +195,7 @@ pub(super) fn serve(
                 continue;
             };
             wire.borrow_mut().busy = true;
-            embassy_futures::block_on(probe.serve::<Plain>(&request));
+            embassy_futures::block_on(probe.serve(&request));
             let mut wire = wire.borrow_mut();
             (wire.busy, wire.stopped) = (false, false);
             // its finger really is in the air

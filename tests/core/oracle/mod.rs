@@ -2,137 +2,18 @@
 //!
 //! Written without a look at any other implementation. K textures, M movements, d features: any number of each. Where the
 //! recipe leaves something open, the reading taken here is marked "reading:".
-#![allow(dead_code)] // each test file that includes this module uses a part of it
 #![allow(unreachable_pub)]
 #![allow(clippy::needless_range_loop)] // indices as in the formulas
-
-use std::f64::consts::PI;
-
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
 
 /// Degrees of freedom of the Student-t that a slide is judged by, and of the background class.
 pub const DEGREES_OF_FREEDOM: f64 = 8.0;
 /// A posterior above this ends an episode.
 pub const SURE: f64 = 0.99;
-/// The stricter threshold.
-pub const STRICT: f64 = 0.999;
-/// Slides after which an episode ends anyway.
-pub const LIMIT: u32 = 10;
 /// Slides of trust that the average over movements has against one movement's own covariance.
 pub const BLEND: f64 = 15.0;
 /// Novelty log-odds that flag an unknown texture after one slide, and after more.
 pub const NOVEL_AT_ONCE: f64 = 2.0;
 pub const NOVEL_LATER: f64 = 1.5;
-/// When an episode's best guess is learned without asking, and how much of it.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Learning {
-    /// The posterior must be above this ...
-    pub sure: f64,
-    /// ... and the novelty log-odds not above this.
-    pub familiar: f64,
-    /// A count grows to this by learning and no further, and no mean moves more slowly than such a count makes it.
-    pub memory: f64,
-}
-
-impl Learning {
-    /// Step 8 as it is written.
-    pub const RECIPE: Self = Self {
-        sure: SURE,
-        familiar: -2.0,
-        memory: 8.0,
-    };
-    /// Means that follow faster. Chosen on the materials of even index of data/biotac, in six sessions cut from them (from
-    /// slide 1, 5 or 9, forwards and backwards in time): of the memories 3, 4, 5, 6, 8 with the recipe's gate, the one that
-    /// was right most often with a user and without.
-    pub const NIMBLE: Self = Self {
-        memory: 3.0,
-        ..Self::RECIPE
-    };
-    /// And a wider gate: right more often without a user, at the price of learning unknown textures more often.
-    pub const NIMBLE_AND_EAGER: Self = Self {
-        sure: 0.9,
-        ..Self::NIMBLE
-    };
-}
-
-/// Step 1: features from samples.
-pub mod features {
-    use super::*;
-
-    /// Samples of a frame of the spectrum.
-    pub const FRAME: usize = 512;
-    /// Samples from one frame to the next.
-    pub const HOP: usize = 256;
-    /// Bins where a band begins; the last is where the twelfth ends.
-    pub const EDGES: [usize; 13] = [4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
-
-    /// Averaged power spectrum, bins 0 to 256, in counts^2 per bin: |X|^2 / sum w^2 under a periodic Hann window, the mean of
-    /// all samples removed first.
-    ///
-    /// # Panics
-    /// Fewer samples than one frame.
-    pub fn spectrum(samples: &[i16]) -> Vec<f64> {
-        assert!(samples.len() >= FRAME, "{} samples", samples.len());
-        let mean = samples.iter().map(|&x| f64::from(x)).sum::<f64>() / samples.len() as f64;
-        let window: Vec<f64> = (0..FRAME)
-            .map(|n| (PI * n as f64 / FRAME as f64).sin().powi(2))
-            .collect();
-        let weight: f64 = window.iter().map(|w| w * w).sum();
-        let fft = FftPlanner::new().plan_fft_forward(FRAME);
-        let frames = samples.windows(FRAME).step_by(HOP);
-        let scale = 1.0 / (weight * frames.len() as f64);
-        let mut psd = vec![0.0; FRAME / 2 + 1];
-        for frame in frames {
-            let mut x: Vec<Complex<f64>> = frame
-                .iter()
-                .zip(&window)
-                .map(|(&x, w)| Complex::from((f64::from(x) - mean) * w))
-                .collect();
-            fft.process(&mut x);
-            for (sum, x) in psd.iter_mut().zip(&x) {
-                *sum += x.norm_sqr() * scale;
-            }
-        }
-        psd
-    }
-
-    /// The twelve ln(mean PSD over the band + 0.1), PSD in counts^2.
-    pub fn ln_bands(samples: &[i16]) -> Vec<f64> {
-        let psd = spectrum(samples);
-        EDGES
-            .windows(2)
-            .map(|e| {
-                let band = &psd[e[0]..e[1]];
-                (band.iter().sum::<f64>() / band.len() as f64 + 0.1).ln()
-            })
-            .collect()
-    }
-
-    /// Mean and standard deviation (over the number of samples).
-    pub fn mean_and_sd(samples: &[i16]) -> (f64, f64) {
-        let n = samples.len() as f64;
-        let mean = samples.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
-        let square = samples.iter().map(|&x| (f64::from(x) - mean).powi(2));
-        (mean, (square.sum::<f64>() / n).sqrt())
-    }
-
-    /// d = 13: mean traction in N, then the bands. Both of the steady part of a slide.
-    pub fn with_traction(pac: &[i16], traction_mn: &[i16]) -> Vec<f64> {
-        let mut x = vec![mean_and_sd(traction_mn).0 / 1000.0];
-        x.extend(ln_bands(pac));
-        x
-    }
-
-    /// d = 14: mean and standard deviation of P_DC in counts, then the bands. Both of the steady part of a slide.
-    pub fn with_pressure(pac: &[i16], pdc: &[i16]) -> Vec<f64> {
-        let (mean, sd) = mean_and_sd(pdc);
-        let mut x = vec![mean, sd];
-        x.extend(ln_bands(pac));
-        x
-    }
-}
-
 /// A square matrix as rows.
 pub type Matrix = Vec<Vec<f64>>;
 
@@ -311,26 +192,6 @@ impl Trained {
         self.means.len() - 1
     }
 
-    /// Step 8: moves the mean of a texture towards one slide (or the mean of an episode's) of a movement.
-    pub fn learn(&mut self, learning: &Learning, texture: usize, movement: usize, z: &[f64]) {
-        let count = &mut self.counts[texture][movement];
-        let rate = 1.0 / (count.min(learning.memory) + 1.0);
-        for (m, z) in self.means[texture][movement].iter_mut().zip(z) {
-            *m += (z - *m) * rate;
-        }
-        *count = count.max((*count + 1.0).min(learning.memory));
-    }
-
-    /// Step 8 for a whole episode. reading: once for each movement made, towards the episode's running mean, since slides of
-    /// one episode share its deviation.
-    pub fn learn_episode(&mut self, learning: &Learning, texture: usize, episode: &Episode) {
-        for (movement, made) in episode.made.iter().enumerate() {
-            if made.slides > 0 {
-                self.learn(learning, texture, movement, &made.mean);
-            }
-        }
-    }
-
     /// Step 6: how far two textures are confused by one slide of a movement. Symmetric, 1 on the diagonal.
     pub fn confusion(&self, movement: usize) -> Matrix {
         let row = |i: usize| {
@@ -438,17 +299,7 @@ impl Episode {
 
     /// The posterior of each texture, all equally probable before.
     pub fn posterior(&self, table: &Trained) -> Vec<f64> {
-        self.posterior_from(table, &vec![1.0; table.textures()])
-    }
-
-    /// The posterior of each texture; `prior` need not sum to 1.
-    pub fn posterior_from(&self, table: &Trained, prior: &[f64]) -> Vec<f64> {
-        let l: Vec<f64> = self
-            .log_likelihoods(table)
-            .iter()
-            .zip(prior)
-            .map(|(l, p)| l + p.ln())
-            .collect();
+        let l = self.log_likelihoods(table);
         let sum = ln_sum_exp(&l);
         l.iter().map(|l| (l - sum).exp()).collect()
     }
@@ -527,11 +378,6 @@ impl Episode {
             NOVEL_LATER
         };
         self.novelty(table) > bar
-    }
-
-    /// Step 8: may the best guess be learned without asking?
-    pub fn certain(&self, learning: &Learning, table: &Trained) -> bool {
-        self.best(table).1 > learning.sure && self.novelty(table) <= learning.familiar
     }
 }
 

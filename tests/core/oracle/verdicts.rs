@@ -25,10 +25,6 @@ impl Drift {
         bands: 0.1,
         traction: 0.04,
     };
-    pub const NONE: Self = Self {
-        bands: 0.0,
-        traction: 0.0,
-    };
 }
 
 /// One of what people are told.

@@ -70,27 +70,6 @@ fn drift(text: &str) -> Result<Drift, String> {
     })
 }
 
-/// When a slide may end before its end.
-#[derive(Args, Clone)]
-pub(crate) struct Ending {
-    /// With --early: the lengths at which a slide may end, s at constant speed
-    #[arg(long, value_name = "S,S,...", value_delimiter = ',', default_value = "1,2,3", requires = "early", value_parser = length)]
-    pub(crate) lengths: Vec<u16>,
-    /// With --early: how improbable all other textures together have to be; several are tried one after the other
-    #[arg(long, value_name = "P,P,...", value_delimiter = ',', requires = "early", value_parser = doubt)]
-    pub(crate) doubt: Vec<f64>,
-}
-
-impl Ending {
-    /// The lengths in ms.
-    ///
-    /// # Errors
-    /// See [`rising`].
-    pub(crate) fn lengths_ms(&self) -> Result<Vec<u16>, UsageError> {
-        rising(&self.lengths)
-    }
-}
-
 /// Lengths as a table has them.
 ///
 /// # Errors
@@ -108,13 +87,6 @@ pub(crate) fn length(text: &str) -> Result<u16, String> {
     match text.trim().parse::<f64>() {
         Ok(s) if (0.3..=60.0).contains(&s) => Ok((s * 1e3).round() as u16),
         _ => Err("seconds from 0.3 to 60, such as 1.5".to_owned()),
-    }
-}
-
-fn doubt(text: &str) -> Result<f64, String> {
-    match text.trim().parse() {
-        Ok(p) if 0.0 < p && p < 1.0 => Ok(p),
-        _ => Err("a probability between 0 and 1, such as 0.001".to_owned()),
     }
 }
 

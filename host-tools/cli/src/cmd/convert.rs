@@ -1,48 +1,39 @@
 //! `tactus convert`: recordings and session logs for the tools of others.
 
 pub(super) mod mcap;
-mod npz;
-mod to;
 
-use std::io::Write;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
-use clap::ArgGroup;
+use anyhow::Context as _;
 use serde::Serialize;
 use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::measure_all;
 
-use self::to::create;
 use super::output::{Format, UsageError, print_json};
 use super::progress::with_progress;
 use super::table_file::is_pipe;
 
-/// Convert recordings or a session's log for other tools: MCAP (Foxglove, PlotJuggler), npz (numpy)
+/// Convert recordings or a session's log to MCAP, for Foxglove and PlotJuggler
 #[derive(clap::Args)]
-#[command(group(ArgGroup::new("kind").args(["mcap", "npz"]).required(true).multiple(true)), after_help = "\
+#[command(after_help = "\
 Examples:
   tactus convert session.jsonl --mcap session.mcap    a log of `tactus device ... --log session.jsonl`
   tactus convert recordings --mcap recordings.mcap    all slides, one after the other
-  tactus convert recordings --npz recordings.npz      numpy.load(\"recordings.npz\")
 
-In an .npz, `pac_7`, `pdc_7`, `shear_7` and `still_7` are the streams of the slide of row 7 of `texture`, `slide`, `movement`, `properties` and
-`ln_bands`. The book lists the channels of an .mcap.")]
+The book lists the channels.")]
 pub(crate) struct Args {
     /// A folder of recordings, or a session's log; "-" reads a log from standard input
     from: PathBuf,
-    /// Write an MCAP file
+    /// The file to write; "-" writes to standard output
     #[arg(long, value_name = "FILE")]
-    mcap: Option<PathBuf>,
-    /// Write an .npz file; of recordings only
-    #[arg(long, value_name = "FILE")]
-    npz: Option<PathBuf>,
+    mcap: PathBuf,
     /// How to print what was written
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
 }
 
-/// A file in `convert --format json`.
+/// The file in `convert --format json`.
 #[derive(Serialize)]
 struct Written {
     file: String,
@@ -51,60 +42,44 @@ struct Written {
 
 /// Writes what was asked for; a file that is there already is left alone.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let asked = [&args.mcap, &args.npz];
-    let asked: Vec<&PathBuf> = asked.into_iter().flatten().collect();
-    let piped = asked.iter().filter(|path| is_pipe(path)).count();
-    if piped > 1 || (piped == 1 && args.format == Format::Json) {
-        let say = "one file alone can go to standard output (\"-\")";
+    let Args { from, mcap, format } = args;
+    if is_pipe(mcap) && *format == Format::Json {
+        let say = "the file goes to standard output (\"-\"), so --format json cannot";
         return Err(UsageError(say.to_owned()).into());
     }
-    let is_set = args.from.is_dir();
-    let from = args.from.display();
-    ensure!(
-        is_set || args.npz.is_none(),
-        "{from}: an .npz holds recordings; name a folder of them, or write --mcap",
-    );
-    if is_set {
-        of_recordings(args)?;
-    } else if let Some(path) = &args.mcap {
-        mcap::log(create(path)?, &args.from)?;
+    if from.is_dir() {
+        let set = RecordingSet::open(from)?;
+        let to = create(mcap)?;
+        let textures = set.textures().len() as u64;
+        with_progress(textures, "converting textures", |done| {
+            mcap::recordings(to, &set, done)
+        })?;
+    } else {
+        mcap::log(create(mcap)?, from)?;
     }
-    let mut files = Vec::new();
-    for path in asked {
-        if !is_pipe(path) {
-            let bytes = std::fs::metadata(path)?.len();
-            let file = path.display().to_string();
-            files.push(Written { file, bytes });
-        }
+    if is_pipe(mcap) {
+        return Ok(());
     }
-    if args.format == Format::Json {
-        print_json(&files, out)?;
-    } else if piped == 0 {
-        // else standard output is the file that was asked for
-        for Written { file, bytes } in files {
-            writeln!(out, "{file}: {bytes} bytes")?;
-        }
+    let bytes = std::fs::metadata(mcap)?.len();
+    let file = mcap.display().to_string();
+    match format {
+        Format::Json => print_json(&[Written { file, bytes }], out)?,
+        Format::Text => writeln!(out, "{file}: {bytes} bytes")?,
     }
     Ok(())
 }
 
-fn of_recordings(args: &Args) -> anyhow::Result<()> {
-    let set = RecordingSet::open(&args.from)?;
-    let textures = set.textures().len() as u64;
-    if let Some(path) = &args.mcap {
-        let to = create(path)?;
-        with_progress(textures, "converting textures", |done| {
-            mcap::recordings(to, &set, done)
-        })?;
-    }
-    if let Some(path) = &args.npz {
-        let measured = with_progress(textures, "measuring slides", |done| {
-            measure_all(&set, |_| done())
-        })?;
-        let to = create(path)?;
-        with_progress(textures, "converting textures", |done| {
-            npz::write(to, &set, &measured, done)
-        })?;
-    }
-    Ok(())
+/// The destination of a file.
+type To = BufWriter<Box<dyn Write + Send>>;
+
+/// Creates a new file, or takes standard output.
+fn create(path: &Path) -> anyhow::Result<To> {
+    tracing::info!(file = %path.display(), "writes");
+    // the lock of standard output is this thread's
+    Ok(BufWriter::new(if is_pipe(path) {
+        Box::new(io::stdout())
+    } else {
+        let file = File::create_new(path);
+        Box::new(file.with_context(|| path.display().to_string())?)
+    }))
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use anyhow::ensure;
 use clap::ValueEnum as _;
 use tactus_core::explorer;
-use tactus_lab::eval::evaluation::{Asked, Evaluation, evaluation};
+use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
 use tactus_lab::eval::experiment::Protocol;
 use tactus_lab::eval::show::count;
 use tactus_study::pictures::evaluation::figures;
@@ -14,7 +14,6 @@ use super::output::{Format, percent, print_json, verdict_rows};
 use super::progress::with_progress;
 pub(crate) use experiment::Args;
 
-mod early;
 mod experiment;
 mod novelty;
 mod verify;
@@ -34,9 +33,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         is_fused || !args.lifelong && !args.verify && args.novelty.is_none(),
         "--novelty, --verify and --lifelong need --method fused: the other methods do not recognise new textures"
     );
-    if args.early {
-        return early::run(args, args.stop.config(args.method), out);
-    }
     let canvas = args.plot.open()?;
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
@@ -51,7 +47,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     // a program gets what the pictures show
     let with_courses = canvas.is_some() || args.format == Format::Json;
-    let asked = Asked {
+    let asked = EvaluationRequest {
         method: args.method,
         protocol,
         runs: args.runs(),

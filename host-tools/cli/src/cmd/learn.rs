@@ -11,8 +11,7 @@ use tactus_core::features::Movement;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{FALSE_ALARM, Table};
 use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::{MeasuredSlide, measure_cut};
-use tactus_lab::eval::early::{is_longer, of_length};
+use tactus_lab::data::replay::{CutSlide, MeasuredSlide, measure_cut};
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::first::learn_first;
 use tactus_lab::eval::learn::{Expected, know_lengths};
@@ -286,4 +285,23 @@ pub(crate) fn learned_here(
         first: if is_own { trials } else { 0 },
         met: HashMap::new(),
     }
+}
+
+/// Returns the slides as their first parts of the `n`th length. What stands for one that is not longer says nothing: see [`is_longer`].
+fn of_length(slides: &[Vec<CutSlide>], n: usize) -> Vec<Vec<MeasuredSlide>> {
+    let cut = |slide: &CutSlide| {
+        let mut cut = slide.whole.clone();
+        if let Some(first) = &slide.first[n] {
+            cut.measurement.clone_from(first);
+        }
+        cut
+    };
+    let rows = slides.iter();
+    rows.map(|row| row.iter().map(cut).collect()).collect()
+}
+
+/// Says whether all slides of a movement last longer than the `n`th length.
+fn is_longer(slides: &[Vec<CutSlide>], movement: Movement, n: usize) -> bool {
+    let mut all = slides.iter().flatten();
+    all.all(|slide| slide.whole.movement != movement || slide.first[n].is_some())
 }

@@ -30,8 +30,8 @@ pairs     eight pairs of similar textures at 99.9 % (Table 4)
 identify  16 textures among 117 at 99 %: cycling, random, Bayesian exploration, fused (Table 5, figs. 3, 4, 10)
 all       all of it
 
-The folder gets report.html, which needs nothing else, every figure as .svg, every table as .csv, the tables in the chip's
-format, and study.json. The same command gives the same files on any number of cores. Until all is there it is called DIR.part;
+The folder gets report.html, which needs nothing else, study.json with all numbers, and the tables in the
+chip's format. The same command gives the same files on any number of cores. Until all is there it is called DIR.part;
 the same command goes on where an interrupted one stopped.
 
 Examples:

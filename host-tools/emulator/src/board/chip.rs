@@ -1,7 +1,7 @@
-//! The chip: rigless' STM32F427 with what it lacks as the firmware's STM32F429, and with the rig on its pins.
+//! The chip: rigless' STM32F427 with the additions that make it the firmware's STM32F429, and with the rig on its pins.
 //!
-//! Added are the edge lines of EXTI and the programmable flash array. Models whose pins the rig needs to the nanosecond
-//! (TIM1, TIM3, TIM4, ADC1) are wrapped: [`Tapped`] lets the rig act before and after whatever happens in them.
+//! The edge lines of EXTI and the programmable flash array are added. Models whose pins the rig needs to the nanosecond
+//! (TIM1, TIM3, TIM4, ADC1) are wrapped: [`Tapped`] lets the rig act before and after every access to them.
 
 use std::num::{NonZeroU32, NonZeroU64};
 
@@ -123,11 +123,11 @@ impl Mcu for Part {
         self.pwm.tap.restart(RESET_HZ);
         self.encoder.model = narrow();
         self.current.model = converter();
-        // the fresh timer believes both lines low, until somebody looks
+        // the fresh timer believes both lines low, until the next read
         self.encoder.tap.lines = (false, false);
     }
 
-    /// Only USART3 has somebody outside. rigless' own poll asks all eight ports at every stop.
+    /// Only USART3 has a peer outside. rigless' own poll asks all eight ports at every stop.
     fn poll(&mut self, now: VirtualNanos) {
         self.f427
             .drive_serial_port(now, USART3, |port, registers, context| {
@@ -186,7 +186,7 @@ pub(crate) struct Board {
     view: MemoryView,
     instructions_per_second: NonZeroU64,
     mpu: armv7m::MpuRegions,
-    /// what drives pins from outside, in the order it began
+    /// the pins that are driven from outside, in the order in which that began
     driven: Vec<(PinId, Option<bool>)>,
 }
 
@@ -254,7 +254,7 @@ impl Board {
         Ok(board)
     }
 
-    /// The level on a pin, whoever makes it.
+    /// The level on a pin, from any driver.
     pub(crate) fn level(&mut self, pin: PinId) -> bool {
         let (gpio, registers) = self.part.f427.port(pin.port());
         gpio.level(pin.pin(), registers) == Level::High

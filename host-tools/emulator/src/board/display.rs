@@ -14,7 +14,7 @@ const ADDRESS: u8 = 0x3C;
 /// The fonts of the screens.
 const FONTS: [&MonoFont<'_>; 3] = [&FONT_6X10, &FONT_7X13_BOLD, &FONT_10X20];
 
-/// What the next byte of a transfer is.
+/// The meaning of a transfer's next byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Next {
     Control,
@@ -33,7 +33,7 @@ pub struct Display {
     wired: bool,
     plugged: bool,
     next: Next,
-    /// a command with what has come of its parameters
+    /// a command with its parameters so far
     command: Vec<u8>,
     ram: [u8; WIDTH * HEIGHT / 8],
     on: bool,
@@ -47,7 +47,7 @@ pub struct Display {
     at: (u8, u8),
     unknown: Vec<u8>,
     bytes: u64,
-    /// the last whole picture that differed from the one before it, and when its last byte came, ns
+    /// the last whole picture that differed from the one before it, and the time of its last byte, ns
     whole: [u8; WIDTH * HEIGHT / 8],
     whole_ns: Option<u64>,
 }
@@ -78,7 +78,7 @@ impl Default for Display {
 }
 
 impl Display {
-    /// What is seen, as the module is held with its pins on top; `None` when it is off.
+    /// The visible picture, as the module is held with its pins on top; `None` when it is off.
     pub fn picture(&self) -> Option<Picture> {
         if !(self.on && self.pump) {
             return None;
@@ -95,12 +95,12 @@ impl Display {
         Some(Picture::from_bytes(seen))
     }
 
-    /// Whether a text is seen, in any of the fonts, dark on light as well.
+    /// Returns true if a text is visible, in any of the fonts, dark on light as well.
     pub fn shows(&self, text: &str) -> bool {
         self.shows_in(text, &FONTS)
     }
 
-    /// Whether a text is seen in one of the larger fonts, as headlines of up to 18 letters are.
+    /// Returns true if a text is visible in one of the larger fonts, as headlines of up to 18 letters are.
     pub fn shows_large(&self, text: &str) -> bool {
         self.shows_in(text, &[&FONT_7X13_BOLD, &FONT_10X20])
     }
@@ -126,7 +126,8 @@ impl Display {
         self.bytes
     }
 
-    /// When what it shows was wholly written, ns; `None` before the first picture. The same picture again is no new one.
+    /// Time when its picture was wholly written, ns; `None` before the first picture. The same picture again is no new
+    /// one.
     pub fn written_ns(&self) -> Option<u64> {
         self.whole_ns
     }
@@ -140,7 +141,7 @@ impl Display {
         };
     }
 
-    /// Whether the pins carry I2C1.
+    /// Connects the pins to I2C1, or not.
     pub(crate) fn wire(&mut self, wired: bool) {
         self.wired = wired;
     }
@@ -205,7 +206,8 @@ impl Display {
             [0xC8] => self.remapped.1 = true,
             [inverted @ 0xA6..=0xA7] => self.inverted = inverted & 1 == 1,
             [on @ 0xAE..=0xAF] => self.on = on & 1 == 1,
-            // contrast, multiplex, offset, clock, precharge, COM pins, VCOMH, start line 0, RAM shown, no scrolling, nothing
+            // contrast, multiplex, offset, clock, precharge, COM pins, VCOMH, start line 0, RAM shown, no scrolling,
+            // nothing
             [0x81 | 0xD5 | 0xD9 | 0xDB, _]
             | [0xA8, 63]
             | [0xD3, 0]
@@ -267,18 +269,19 @@ fn write(text: &str, font: &MonoFont<'_>) -> Picture {
     picture
 }
 
-/// The rows of a picture, a point a bit: words are looked for at every step of a run, and point by point that took a tenth of it.
+/// The rows of a picture, a point a bit: words are looked for at every step of a run, and point by point that took a
+/// tenth of it.
 fn rows(picture: &Picture) -> [u128; HEIGHT] {
     let lit = |x: usize, y: usize| u128::from(picture.is_lit(x, y)) << x;
     std::array::from_fn(|y| (0..WIDTH).fold(0, |row, x| row | lit(x, y)))
 }
 
-/// Whether that corner of `part` is somewhere in `whole`, inverted or not.
+/// Returns true if that corner of `part` is somewhere in `whole`, inverted or not.
 fn is_in(whole: &[u128; HEIGHT], part: &Picture, width: usize, height: usize) -> bool {
     let part = &rows(part)[..height];
     let wide = u128::MAX.checked_shr((WIDTH - width) as u32).unwrap_or(0);
-    // headlines begin a row above the glass, with a row of the font that is empty, and what ends at its right edge leaves
-    // the gap to the next letter, a column, beyond it
+    // headlines begin a row above the glass, with a row of the font that is empty, and what ends at its right edge
+    // leaves the gap to the next letter, a column, beyond it
     let is_at = |left: usize, rows_above: usize, top: usize, inverted: u128| {
         let on_glass = u128::MAX.checked_shr(left as u32).unwrap_or(0) & wide;
         part.iter().enumerate().all(|(y, row)| {
@@ -322,7 +325,7 @@ mod tests {
         send(&mut display, &[&[0x40], &text.bytes()[500..]].concat());
         assert!(display.picture() == Some(text));
         assert_eq!(display.written_ns(), Some(0));
-        // the same again is nothing new, and half a picture is none
+        // the same picture again is not new, and half a picture is not whole
         let again = [&[0x40], &write("Tactus", &FONT_7X13_BOLD).bytes()[..]].concat();
         send_at(&mut display, 5, &again);
         send_at(&mut display, 6, &[0x40; 500]);
@@ -342,7 +345,7 @@ mod tests {
             ..display.clone()
         };
         assert!(other.shows("lost 0") && !other.shows("lost 8") && !other.shows("lost 0 "));
-        // turned round, nobody reads it; inverted, everybody
+        // turned round, it cannot be read; inverted, it can
         send(&mut display, &[0x80, 0xA0, 0x80, 0xA7]);
         assert!(!display.shows("Tactus"));
         send(&mut display, &[0x00, 0xA1]);

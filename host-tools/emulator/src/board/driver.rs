@@ -1,5 +1,5 @@
-//! What happens round every access and stop of the emulated core: pins to the rig, the flash array, the log, and the
-//! owner's commands.
+//! The work at every access and stop of the emulated core: pins to the rig, the flash array, the log, and the owner's
+//! commands.
 
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -42,7 +42,7 @@ pub(crate) struct Standing<'a> {
     pub(crate) driver: &'a mut Driver,
 }
 
-/// What the owner wants.
+/// The owner's commands.
 pub(crate) enum Command {
     /// Go on until then, ns.
     RunUntil(u64),
@@ -53,7 +53,7 @@ pub(crate) enum Command {
 pub(crate) struct Driver {
     pub(crate) rig: SharedRig,
     pub(crate) commands: Receiver<Command>,
-    /// gets the time whenever it is reached
+    /// gets every time that is reached
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
     pub(crate) stack: Option<Stack>,
@@ -156,8 +156,8 @@ impl Driver {
         rig.display_mut().wire(display);
     }
 
-    /// Brings what drives the sensor's and the encoder's wires to the pins that the chip reads as a port: by their alternate functions
-    /// SPI and timer have it to the byte and to the edge.
+    /// Brings the levels that drive the sensor's and the encoder's wires to the pins that the chip reads as a port: by
+    /// their alternate functions SPI and timer have them to the byte and to the edge.
     fn lines(&self, board: &mut Board, at: VirtualNanos) {
         let ids = [
             pins::SENSOR_SPI[1],
@@ -173,7 +173,7 @@ impl Driver {
         }
     }
 
-    /// The chip is as after a reset: its pins are let go, what drives them from outside must do it again.
+    /// The chip is as after a reset: its pins are let go, and outside drivers must drive them again.
     fn restarted(&mut self, board: &mut Board, at: VirtualNanos) {
         board.redrive(at);
         if let Some(slot) = board.part.bus().slot_of("FLASH") {
@@ -296,8 +296,8 @@ impl Driver {
             }
             SPI1_CR1 => lock(&self.rig).spi_control(access.value),
             SPI4_CR1 => lock(&self.rig).motion().control(access.value),
-            // The model raises CC1IF to CC4IF with UG while the counter stands. embassy's clock, on TIM5, would count half a
-            // period too many: it would start at 65.5 ms, and some timers would come 65.5 ms late.
+            // The model raises CC1IF to CC4IF with UG while the counter stands. embassy's clock, on TIM5, would count
+            // half a period too many: it would start at 65.5 ms, and some timers would come 65.5 ms late.
             TIM5_EGR => {
                 let part = &mut session.board_mut().part;
                 // the register is there, and its clock is on: EGR has just been written

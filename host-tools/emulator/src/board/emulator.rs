@@ -1,4 +1,4 @@
-//! The emulator for those who use it.
+//! The emulator's interface for its users.
 
 use std::ops::Range;
 use std::path::Path;
@@ -37,14 +37,14 @@ use super::upset::Switch;
 /// A reset of the chip.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reset {
-    /// When, ns.
+    /// Its time, ns.
     pub at_ns: u64,
     /// By what: the core itself, or an instance such as IWDG.
     pub cause: ResetCause,
 }
 
-/// A board that runs an ELF, with the rig on its pins. It stands except in [`Emulator::run_until`] and its like. What looks
-/// into the chip is an error once the run is over ([`Error::Ended`]).
+/// A board that runs an ELF, with the rig on its pins. It stands except in [`Emulator::run_until`] and its like. Access
+/// to the chip is an error once the run is over ([`Error::Ended`]).
 pub struct Emulator {
     rig: SharedRig,
     commands: Option<Sender<Command>>,
@@ -144,7 +144,7 @@ impl Emulator {
         }
     }
 
-    /// Why the run is over.
+    /// The reason why the run is over.
     fn end(&mut self) -> Error {
         self.commands = None;
         match self.thread.take().map(JoinHandle::join) {
@@ -182,7 +182,7 @@ impl Emulator {
         self.run_until(self.now_ns + ms * 1_000_000)
     }
 
-    /// Goes on in steps of `step_ns` until `done` says so, at most until `limit_ns`; whether it did.
+    /// Runs in steps of `step_ns` until `done` returns true, at most until `limit_ns`; returns true if it did.
     pub fn run_to(
         &mut self,
         limit_ns: u64,
@@ -272,11 +272,11 @@ impl Emulator {
         })
     }
 
-    /// Addresses that the firmware used and nothing is at.
+    /// Addresses that the firmware used and that are empty.
     fn unmapped(&mut self) -> Result<Vec<u64>, Error> {
         self.with(|standing| {
             let unmapped = standing.session.unmapped().into_iter();
-            // stores to the array are listed, since the driver does what they do
+            // stores to the array are listed, since the driver programs it
             unmapped
                 .map(|access| access.address)
                 .filter(|address| !flash::ARRAY.contains(address))
@@ -284,8 +284,8 @@ impl Emulator {
         })
     }
 
-    /// What the firmware did so far that the chip's vendor does not allow, and what the models report themselves. None should be
-    /// here.
+    /// The firmware's violations of the vendor's rules so far, and the reports of the models themselves. There should
+    /// be none.
     pub fn violations(&mut self) -> Result<Vec<Violation>, Error> {
         let mut found = self.with(|standing| {
             let referee = standing.driver.referee.as_ref();
@@ -327,18 +327,18 @@ impl Emulator {
         self.with(move |standing| standing.session.board_mut().drive(at, pin, None))
     }
 
-    /// Whether the green, the blue and the red LED are on.
+    /// Levels of the green, the blue and the red LED: true is on.
     pub fn leds(&mut self) -> Result<[bool; 3], Error> {
         self.with(|standing| pins::LEDS.map(|led| standing.session.board_mut().level(led)))
     }
 
-    /// Whether the go / no-go output is high.
+    /// Returns true if the go / no-go output is high.
     pub fn go(&mut self) -> Result<bool, Error> {
         self.with(|standing| standing.session.board_mut().level(pins::GO))
     }
 
-    /// The debug probe's 8 MHz stop, for good. The chip's clock security system, where the firmware has turned it on, does
-    /// all that it does but the NMI, which rigless cannot raise: write ICSR by code of your own.
+    /// The debug probe's 8 MHz stop, for good. The chip's clock security system, where the firmware has turned it on,
+    /// does all that it does but the NMI, which rigless cannot raise: write ICSR by code of your own.
     pub fn stop_clock(&mut self) -> Result<(), Error> {
         let at = VirtualNanos(self.now_ns);
         self.with(move |standing| {
@@ -350,8 +350,8 @@ impl Emulator {
         })
     }
 
-    /// From now on the flash's interrupt clears its flags, and wakes nobody; by new code for its handler. What to write back,
-    /// and where.
+    /// Makes the flash's interrupt clear its flags without waking a task, by new code for its handler. Returns the
+    /// original code and its address.
     ///
     /// # Errors
     /// [`Error::Symbol`] and [`Error::NoSpace`].
@@ -384,13 +384,13 @@ impl Emulator {
         })
     }
 
-    /// From now on an erase is never over: the flash says that it is busy.
+    /// Makes every erase endless from now on: the flash stays busy.
     pub fn stick_flash(&mut self) -> Result<(), Error> {
         self.with(|standing| standing.driver.flash_stuck = true)
     }
 
-    /// From now on an erase takes as long as with words of 8 bits: twice the typical time, which is the longest that the data
-    /// sheet allows.
+    /// From now on an erase takes as long as with words of 8 bits: twice the typical time, which is the longest that
+    /// the data sheet allows.
     pub fn slow_erases(&mut self) -> Result<(), Error> {
         self.with(|standing| standing.driver.flash_slow = true)
     }
@@ -406,8 +406,8 @@ impl Emulator {
             .ok_or(Error::Memory { address })
     }
 
-    /// A debugger halts the core, until [`Emulator::go_on`]: time passes, and what DBGMCU does not stop goes on. With
-    /// `watchdog_stands` its tool has told DBGMCU to stop the watchdog.
+    /// A debugger halts the core, until [`Emulator::go_on`]: time passes, and everything runs that DBGMCU does not
+    /// stop. With `watchdog_stands` its tool has set DBGMCU to stop the watchdog.
     pub fn halt(&mut self, watchdog_stands: bool) -> Result<(), Error> {
         let at = VirtualNanos(self.now_ns);
         self.with(move |standing| {
@@ -417,7 +417,7 @@ impl Emulator {
         })
     }
 
-    /// The debugger lets the core go on.
+    /// The debugger resumes the core.
     pub fn go_on(&mut self) -> Result<(), Error> {
         let at = VirtualNanos(self.now_ns);
         self.with(move |standing| {
@@ -434,17 +434,17 @@ impl Emulator {
         self.with(move |standing| standing.session.reset_by_pin(at, 0, standing.host))
     }
 
-    /// The firmware's store as it is now: what survives a power cut.
+    /// The firmware's store as it is now; it survives a power cut.
     pub fn store(&mut self) -> Result<Vec<u8>, Error> {
         self.read(flash::STORE.start, flash::STORE.end - flash::STORE.start)
     }
 
-    /// What the firmware did to its store since the last call, in the order of time.
+    /// The firmware's writes to its store since the last call, in the order of time.
     pub fn store_writes(&mut self) -> Result<Vec<FlashWrite>, Error> {
         self.with(|standing| std::mem::take(&mut standing.driver.stored))
     }
 
-    /// Where the core stands: the address of its next instruction.
+    /// Address of the core's next instruction.
     pub fn program_counter(&mut self) -> Result<Option<u32>, Error> {
         self.with(|standing| register(standing.host, 15))
     }
@@ -461,7 +461,7 @@ impl Emulator {
         })
     }
 
-    /// What was counted since [`Emulator::count_handlers`], in the order of the addresses.
+    /// The counts since [`Emulator::count_handlers`], in the order of the addresses.
     pub fn handlers(&mut self) -> Result<Vec<HandlerProfile>, Error> {
         self.with(|standing| {
             let profiler = standing.driver.profiler.as_ref();
@@ -469,8 +469,9 @@ impl Emulator {
         })
     }
 
-    /// Follows every instruction from now on with the model of the core's [cycles](super::cycles), by groups of handlers at these
-    /// addresses. With a switch, those that are executed while the word at that address is not 0. Costs most of the speed.
+    /// Follows every instruction from now on with the model of the core's [cycles](super::cycles), by groups of
+    /// handlers at these addresses. With a switch, those that are executed while the word at that address is not 0.
+    /// Costs most of the speed.
     pub fn trace_cycles(
         &mut self,
         groups: Vec<Vec<u64>>,
@@ -490,7 +491,7 @@ impl Emulator {
         })
     }
 
-    /// What was spent since [`Emulator::trace_cycles`] or the last call.
+    /// The cycles since [`Emulator::trace_cycles`] or the last call.
     pub fn cycle_profile(&mut self) -> Result<CycleProfile, Error> {
         self.with(|standing| {
             let tracer = standing.driver.tracer.as_mut();
@@ -498,7 +499,7 @@ impl Emulator {
         })
     }
 
-    /// What was spent since then, and an end of [`Emulator::trace_cycles`].
+    /// The cycles since then, and an end of [`Emulator::trace_cycles`].
     pub fn untrace_cycles(&mut self) -> Result<CycleProfile, Error> {
         self.with(|standing| {
             let tracer = standing.driver.tracer.take();
@@ -507,18 +508,18 @@ impl Emulator {
         })
     }
 
-    /// How slots and servo kept their time since the last call.
+    /// Punctuality of slots and servo since the last call.
     pub fn timing(&mut self) -> Result<Timing, Error> {
         self.with(|standing| std::mem::take(&mut standing.driver.timing))
     }
 
-    /// Measures from now on how deep the stack gets. To be called at time 0: it paints the whole stack. Costs most of the
-    /// speed.
+    /// Measures the depth of the stack from now on. To be called at time 0: it paints the whole stack. Costs most of
+    /// the speed.
     pub fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
         self.with(|standing| standing.driver.stack = Some(Stack::new(layout, standing.host)))
     }
 
-    /// What was found of the stack since [`Emulator::measure_stack`]; `None` without it.
+    /// The use of the stack since [`Emulator::measure_stack`]; `None` without it.
     pub fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
         self.with(|standing| {
             let stack = standing.driver.stack.as_mut();
@@ -568,8 +569,8 @@ impl Emulator {
         })?
     }
 
-    /// Writes memory, flash too, whatever is in it: to break code on purpose, put `[0xFE, 0xE7]`, a branch to itself, or
-    /// `[0x00, 0xDE]`, an undefined instruction, at the address of a function.
+    /// Writes memory, flash too: to break code on purpose, put `[0xFE, 0xE7]`, a branch to itself, or `[0x00, 0xDE]`,
+    /// an undefined instruction, at the address of a function.
     ///
     /// # Errors
     /// [`Error::Memory`].
@@ -591,7 +592,7 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // the run ends when nobody commands it
+        // the run ends when its commands end
         self.commands = None;
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();

@@ -1,8 +1,8 @@
-//! Why there is no run, or no more of it.
+//! Reasons why there is no run, or why it is over.
 
 use std::path::PathBuf;
 
-/// Why there is no run, or no more of it.
+/// Reasons why there is no run, or why it is over.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -11,7 +11,7 @@ pub enum Error {
     Read {
         /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// It is no ELF.
@@ -19,7 +19,7 @@ pub enum Error {
     Elf {
         /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: object::Error,
     },
     /// It does not fit into the chip, or is not for it.
@@ -39,9 +39,9 @@ pub enum Error {
         "{name}: {count} symbols of the ELF have that in their name, it takes exactly one: {examples}"
     )]
     Symbol {
-        /// What was looked for.
+        /// The name that was looked for.
         name: String,
-        /// How many.
+        /// Number of matches.
         count: usize,
         /// Some of them.
         examples: String,
@@ -51,15 +51,15 @@ pub enum Error {
     NoSpace {
         /// The function.
         name: &'static str,
-        /// What it has, bytes.
+        /// Its size, bytes.
         size: u64,
-        /// What it takes, bytes.
+        /// The size of the new code, bytes.
         needed: u64,
     },
     /// No memory there.
     #[error("no memory at {address:#010x}")]
     Memory {
-        /// Where.
+        /// The address.
         address: u64,
     },
 }

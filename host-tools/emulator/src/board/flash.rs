@@ -1,10 +1,10 @@
-//! The chip's flash array: what stores and erases do to it (RM0090 3.6 and 3.7).
+//! The chip's flash array: effects of stores and erases on it (RM0090 3.6 and 3.7).
 
 use std::ops::Range;
 
 use rigless::soc::Width;
 
-/// Where the array begins.
+/// Address of the array.
 pub const FLASH: u64 = 0x0800_0000;
 /// The firmware's store: bank 2's four sectors of 16 KB, the one of 64 KB and the first of 128 KB.
 pub const STORE: Range<u64> = 0x0810_0000..0x0814_0000;
@@ -26,14 +26,14 @@ const PGSERR: u64 = 1 << 7;
 const PGPERR: u64 = 1 << 6;
 pub(super) const BSY: u64 = 1 << 16;
 
-/// What the firmware did to its store.
+/// A write of the firmware to its store.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FlashWrite {
     /// It programmed a word.
     Program {
-        /// Where, from the store's first byte on.
+        /// Its place, from the store's first byte on.
         at: usize,
-        /// What is there afterwards.
+        /// The word afterwards.
         word: u32,
     },
     /// It erased a sector.
@@ -103,7 +103,8 @@ pub(crate) fn erased(cr: u64, sr: u64) -> Option<Range<u64>> {
     begun.then(|| sector(cr >> SNB_SHIFT & 0x1F)).flatten()
 }
 
-/// What is stored to CR to prepare an erase, with words of 8 bits; `None` for any other store.
+/// The value to store to CR in place of the one that prepares an erase, for words of 8 bits; `None` for any other
+/// store.
 pub(crate) fn slower(cr: u64) -> Option<u64> {
     (cr & (PG | STRT | LOCK) == 0).then_some(cr & !(3 << PSIZE_SHIFT))
 }

@@ -1,8 +1,8 @@
-//! A debugger that halts the core: what goes on meanwhile, and what DBGMCU has stopped with it.
+//! A debugger that halts the core: the parts that run on meanwhile, and those that DBGMCU stops with it.
 //!
-//! Timers and the watchdog count on in a halt unless the firmware, or the debugger's tool, has asked DBGMCU to stop them with the
-//! core (RM0090 38.16.4 and 38.16.5): rigless keeps its registers, and has no debugger that halts. An interrupt that comes
-//! meanwhile waits.
+//! Timers and the watchdog count on in a halt unless the firmware, or the debugger's tool, has asked DBGMCU to stop
+//! them with the core (RM0090 38.16.4 and 38.16.5): rigless keeps its registers, and has no debugger that halts. An
+//! interrupt that comes meanwhile waits.
 
 use rigless::mcu::{Mcu as _, Operate as _};
 use rigless::soc::Width;
@@ -11,8 +11,8 @@ use rigless::time::VirtualNanos;
 
 use super::chip::Part;
 
-/// CR1 of the timers that can be stopped with the core, by the bit that does it: TIM2 to TIM5 of APB1_FZ, TIM1 and TIM8 of
-/// APB2_FZ.
+/// CR1 of the timers that can be stopped with the core, by the bit that does it: TIM2 to TIM5 of APB1_FZ, TIM1 and TIM8
+/// of APB2_FZ.
 const TIMERS: [(Register, u64, u64); 6] = [
     (Register::DbgmcuApb1Fz, 1 << 0, 0x4000_0000),
     (Register::DbgmcuApb1Fz, 1 << 1, 0x4000_0400),
@@ -38,7 +38,7 @@ pub(super) struct Halt {
 }
 
 impl Halt {
-    /// The core stands from now on. With `watchdog_stands` the tool has told DBGMCU to stop the watchdog.
+    /// The core stands from now on. With `watchdog_stands` the tool has set DBGMCU to stop the watchdog.
     pub(super) fn begin(part: &mut Part, at: VirtualNanos, watchdog_stands: bool) -> Self {
         let bits = |part: &Part, register| {
             let registers = part.bus().registers("DBG");
@@ -71,7 +71,7 @@ impl Halt {
         }
     }
 
-    /// The core goes on.
+    /// The core continues.
     pub(super) fn end(self, part: &mut Part, at: VirtualNanos) {
         for cr1 in self.standing {
             let now = part.read(at, cr1, Width::W32).unwrap_or_default();

@@ -1,16 +1,16 @@
-//! How many instructions exception handlers take, without those of others that interrupt them.
+//! Instructions that exception handlers take, without those of others that interrupt them.
 
 use rigless::emulator::{Hit, Host};
 
 use super::handlers::Handlers;
 use super::registers::register;
 
-/// What a handler took.
+/// The instructions of a handler.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct HandlerProfile {
     /// Its address.
     pub address: u64,
-    /// How often it ran to its end.
+    /// Number of its completed runs.
     pub runs: u64,
     /// Instructions of all runs.
     pub instructions: u64,

@@ -1,10 +1,10 @@
-//! Exception handlers that are watched: when each begins and when it is over, however they interrupt one another.
+//! Exception handlers that are watched: begin and end of each, under any nesting.
 
 use rigless::emulator::{Hit, Host, Watch};
 
 use super::registers::word;
 
-/// Where an exception frame holds the address to return to (ARM DDI 0403, B1.5.6), bytes above the stack pointer.
+/// Place of the return address in an exception frame (ARM DDI 0403, B1.5.6), bytes above the stack pointer.
 const RETURN: u32 = 24;
 
 /// A handler that runs.
@@ -15,7 +15,7 @@ pub(super) struct Running<T> {
     pub(super) sp: u32,
     /// The instruction that it interrupted.
     returns_to: u64,
-    /// What its watcher keeps of its begin.
+    /// Its watcher's data from its begin.
     pub(super) kept: T,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct Running<T> {
 pub(super) struct Handlers<T> {
     addresses: Vec<u64>,
     running: Vec<Running<T>>,
-    /// Somebody else watches all code.
+    /// All code is watched already.
     is_watched: bool,
 }
 
@@ -50,7 +50,7 @@ impl<T> Handlers<T> {
         }
     }
 
-    /// Whether a handler may begin or be over at a hit.
+    /// Returns true if a handler may begin or be over at a hit.
     pub(super) fn concerns(&self, hit: &Hit) -> bool {
         let mut returns = self.running.iter().map(|running| running.returns_to);
         returns.any(|at| at == hit.address) || self.addresses.contains(&hit.address)
@@ -79,7 +79,7 @@ impl<T> Handlers<T> {
         });
     }
 
-    /// The latest handler that is over at a hit, until there is none: its frame is gone, or another one begins upon the same.
+    /// The latest handler that is over at a hit, or `None`: its frame is gone, or another one begins upon the same.
     pub(super) fn ended(&mut self, hit: &Hit, sp: u32, host: &mut dyn Host) -> Option<Running<T>> {
         let begins = self.begun(hit).is_some();
         let ended = self.running.pop_if(|running| {

@@ -21,7 +21,7 @@ impl LineNoise {
         }
     }
 
-    /// What becomes of a byte.
+    /// The byte after the noise; `None` if it is lost.
     pub(super) fn pass(&mut self, now_ns: u64, byte: u8) -> Option<u8> {
         if now_ns >= self.until_ns || self.random.random::<f64>() >= self.share {
             return Some(byte);

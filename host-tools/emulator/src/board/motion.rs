@@ -8,7 +8,7 @@ const CR1_DIVIDER: u64 = 3;
 const CR1_LSB_FIRST: u64 = 1 << 7;
 /// Clock of the bus before it is divided, Hz.
 const BUS_HZ: u64 = 84_000_000;
-/// What an input reads that nobody drives.
+/// Reading of an input that nothing drives.
 const FLOATING: u8 = 0xFF;
 
 /// Its end of the bus.
@@ -22,7 +22,7 @@ pub struct MotionPeer {
 }
 
 impl MotionPeer {
-    /// It has got its power, over this ground; without a ground there is none.
+    /// It has got its power, over this ground; without a ground there is no sensor.
     pub(crate) fn new(seed: u64, ground: Option<Ground>) -> Self {
         Self {
             flow: ground.map(|ground| Flow::new(seed, ground)),
@@ -45,7 +45,7 @@ impl MotionPeer {
         self.control = cr1;
     }
 
-    /// Whether the pins carry SPI4.
+    /// Connects the pins to SPI4, or not.
     pub(crate) fn wire(&mut self, wired: bool) {
         self.wired = wired;
     }
@@ -75,7 +75,7 @@ impl MotionPeer {
         let begins_ns = now_ns - 8 * divider * 1_000_000_000 / BUS_HZ;
         let understood =
             self.control & CR1_MODE == CR1_MODE && self.control & CR1_LSB_FIRST == 0 && bits == 8;
-        // chosen: what it cannot understand is lost
+        // chosen: a byte that it cannot understand is lost
         if understood {
             flow.byte(begins_ns, now_ns, mosi)
         } else {

@@ -1,5 +1,5 @@
-//! The far ends of the chip's buses: the host on USART3, the sensor on SPI1, the handheld's sensor of motion on SPI4, the display on
-//! I2C1.
+//! The far ends of the chip's buses: the host on USART3, the sensor on SPI1, the handheld's sensor of motion on SPI4,
+//! the display on I2C1.
 
 use rigless::chip::{Timeline, i2c, spi, uart};
 use rigless::snapshot::Store;

@@ -1,4 +1,4 @@
-//! Which pin carries what: the contract between the firmware's board and the rig.
+//! The signals of the pins: the contract between the firmware's board and the rig.
 
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 
@@ -36,7 +36,8 @@ pub const SENSOR_CS_2: PinId = PinId(D, 15);
 /// The sensor's clock, MISO and MOSI, with SPI1's alternate function.
 pub(crate) const SENSOR_SPI: [PinId; 3] = [PinId(A, 5), PinId(A, 6), PinId(B, 5)];
 pub(crate) const SPI1_FUNCTION: u8 = 5;
-/// Chip select of the handheld's sensor of motion, low active; its clock, MISO and MOSI, with SPI4's alternate function.
+/// Chip select of the handheld's sensor of motion, low active; its clock, MISO and MOSI, with SPI4's alternate
+/// function.
 pub(crate) const MOTION_CS: PinId = PinId(E, 4);
 pub(crate) const MOTION_SPI: [PinId; 3] = [PinId(E, 2), PinId(E, 5), PinId(E, 6)];
 pub(crate) const SPI4_FUNCTION: u8 = 5;

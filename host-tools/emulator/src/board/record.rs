@@ -1,4 +1,4 @@
-//! How slides were really made: forces and speeds of the world, instants of the sensor's slots.
+//! The ground truth of slides: forces and speeds of the world, instants of the sensor's slots.
 
 use tactus_world::world::Truth;
 
@@ -17,12 +17,12 @@ const MEAN_MS: usize = 100;
 /// Slots in a second (PAPER: both pressures at 2200 Hz).
 const SLOTS_HZ: f64 = 4400.0;
 
-/// A slide as it really was.
+/// The ground truth of a slide.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Slide {
-    /// When the stage began to move, ns.
+    /// Time when the stage began to move, ns.
     pub began_ns: u64,
-    /// When it stood again or the finger was off, ns.
+    /// Time when it stood again or the finger was off, ns.
     pub ended_ns: u64,
     /// Contact force when the stage began to move, N.
     pub force_n: f64,
@@ -42,12 +42,12 @@ pub struct Slide {
     pub slot_jitter_us: f64,
 }
 
-/// A contact as it really was.
+/// The ground truth of a contact.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Touch {
-    /// When it began, ns.
+    /// Time when it began, ns.
     pub began_ns: u64,
-    /// When the finger was off again, ns.
+    /// Time when the finger was off again, ns.
     pub ended_ns: Option<u64>,
 }
 
@@ -141,7 +141,7 @@ impl Recorder {
         });
         let ramp_s = wanted / ACCELERATION_MM_S2;
         let from = ((ramp_s + SETTLING_S) * 1e3) as usize;
-        // a little longer than the ramp, whose begin nobody tells
+        // a little longer than the ramp, whose begin is unknown
         let to = self
             .speeds
             .len()

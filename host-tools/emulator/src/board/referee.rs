@@ -1,6 +1,6 @@
-//! Judges every access of the firmware to a peripheral by what the vendor says of the chip, not by what the models here
-//! believe: stm32-metapac's metadata (clocks, alternate functions, DMA requests, registers and their fields) and ST's SVD
-//! (reset values). Limits that neither has are quoted from RM0090 and the data sheet.
+//! Judges every access of the firmware to a peripheral by the vendor's documents of the chip, not by the models here:
+//! stm32-metapac's metadata (clocks, alternate functions, DMA requests, registers and their fields) and ST's SVD (reset
+//! values). Limits that neither has are quoted from RM0090 and the data sheet.
 
 mod accelerator;
 mod converter;
@@ -22,13 +22,15 @@ use accelerator::Accelerator;
 use converter::Converters;
 use vendor::{Vendor, Word};
 
-/// Status registers that are cleared by zeros (rc_w0). The vendor's own library writes ones to all else in them, reserved bits too.
+/// Status registers that are cleared by zeros (rc_w0). The vendor's own library writes ones to all else in them,
+/// reserved bits too.
 const CLEARED_BY_ZEROS: [(&str, &str); 3] = [("timer", "SR"), ("usart", "SR"), ("i2c", "SR1")];
-/// Data registers take bytes, though the manual asks for half-words: the vendor's own library and embassy write them so.
+/// Data registers take bytes, though the manual asks for half-words: the vendor's own library and embassy write them
+/// so.
 const DATA: &str = "DR";
 
-/// Kinds of peripherals whose registers are written by half-words or words (RM0090 12.3, 13.13, 17.4, 21.4, 27.6, 30.6): a byte
-/// lands in all lanes.
+/// Kinds of peripherals whose registers are written by half-words or words (RM0090 12.3, 13.13, 17.4, 21.4, 27.6,
+/// 30.6): a byte lands in all lanes.
 const NO_BYTES: [&str; 6] = ["exti", "adc", "timer", "iwdg", "i2c", "usart"];
 /// Exceptions before the chip's interrupts.
 const FIRST_INTERRUPT: u32 = 16;
@@ -42,7 +44,7 @@ const PORTS: [&str; 11] = [
     "GPIOK",
 ];
 
-/// What a signal of a peripheral that was started wants.
+/// The pins that a signal of a started peripheral needs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wants {
     /// One pin or several.
@@ -53,8 +55,8 @@ enum Wants {
     NoTwo,
 }
 
-/// Kinds of peripherals, as [`METADATA`] has them, with the register and field that start them, and signals with a field that
-/// must be set for each.
+/// Kinds of peripherals, as [`METADATA`] has them, with the register and field that start them, and signals with a
+/// field that must be set for each.
 type Start = (
     &'static str,
     &'static str,
@@ -87,10 +89,10 @@ const STARTS: [Start; 3] = [
 #[derive(Debug)]
 pub(crate) struct Referee {
     vendor: &'static Vendor,
-    /// What was last written to each word, or its reset value. Only of words that the firmware alone changes it means
-    /// anything.
+    /// Last value written to each word, or its reset value. It is meaningful only for words that the firmware alone
+    /// changes.
     written: FxHashMap<u64, u32>,
-    /// Encoders whose pins were looked at since a pin or a timer's mode changed.
+    /// Encoders whose pins were checked since a pin or a timer's mode changed.
     encoders: BTreeSet<&'static str>,
     found: BTreeMap<(Rule, String), Violation>,
     /// The handler of interrupts that have none.
@@ -176,7 +178,7 @@ impl Referee {
         self.tell(now, Rule::NoHandler, name.to_owned());
     }
 
-    /// What was found, by rule.
+    /// The violations, by rule.
     pub(crate) fn found(&self) -> Vec<Violation> {
         self.found.values().cloned().collect()
     }
@@ -268,7 +270,7 @@ impl Referee {
         }
     }
 
-    /// Whether a peripheral is clocked, and not held in reset.
+    /// Checks that a peripheral is clocked, and not held in reset.
     fn powered(&mut self, now: Now, number: usize, what: &str) {
         let [enabled, reset] = self.vendor.switches(number).map(|place| {
             let (address, bits) = place?;
@@ -571,7 +573,7 @@ impl Referee {
         }
     }
 
-    /// A store to the flash array, with CR and SR of the flash, before it is made; `old` is what is there.
+    /// A store to the flash array, with CR and SR of the flash, before it is made; `old` is the word there.
     pub(crate) fn programs(&mut self, access: &Access, cr: u64, old: u64) {
         let Some(now) = Now::of(access) else { return };
         let (mask, sector) = (access.width.mask(), access.address & !0x3FFF);

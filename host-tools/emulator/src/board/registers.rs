@@ -8,11 +8,11 @@ pub(crate) fn word(address: u32, host: &mut dyn Host) -> u32 {
     host.read(address.into(), Width::W32).unwrap_or_default() as u32
 }
 
-/// Where [`register`] has IPSR, the exception that is handled: behind R0 to R15, five flags, GE, IT and T.
+/// Place of IPSR, the exception that is handled, in [`register`]'s state: behind R0 to R15, five flags, GE, IT and T.
 pub(crate) const IPSR: usize = 24;
 
-/// A register of the core, R0 to R15 and [`IPSR`]. rigless shows none, but its saved state, of which the exact version in Cargo.toml has
-/// this form: postcard's, the length of the core's part and R0 to R15 first.
+/// A register of the core, R0 to R15 and [`IPSR`]. rigless shows none, but its saved state, of which the exact version
+/// in Cargo.toml has this form: postcard's, the length of the core's part and R0 to R15 first.
 pub(crate) fn register(host: &mut dyn Host, number: usize) -> Option<u32> {
     let state = host.save_state().ok()?;
     let mut numbers = Numbers(&state);

@@ -1,4 +1,4 @@
-//! The simulated rig behind the board's pins, and what it notes of them.
+//! The simulated rig behind the board's pins, and its notes of them.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,8 +14,8 @@ use super::options::Options;
 use super::record::{Recorder, Slide, Touch};
 use super::wave::Wave;
 
-/// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at 2.7 V
-/// (DS21034), 150 ns a clock of the ADS1220 (SBAS501, 6.6).
+/// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at
+/// 2.7 V (DS21034), 150 ns a clock of the ADS1220 (SBAS501, 6.6).
 const fn fastest_byte_ns(finger: FingerName) -> &'static [u64] {
     match finger {
         FingerName::Biotac => &[800],
@@ -23,12 +23,11 @@ const fn fastest_byte_ns(finger: FingerName) -> &'static [u64] {
         FingerName::Mems => &[800, 1200],
     }
 }
-/// What reads Z from the accelerometer, in each slot.
+/// The byte that reads Z from the accelerometer, in each slot.
 const READ_Z: u8 = 0xAC;
 /// CR1 of an SPI (RM0090 28.5.1): clock phase, clock polarity.
 const CR1_MODE: u64 = 0b11;
 const CR1_LSB_FIRST: u64 = 1 << 7;
-/// Where its baud rate begins: the clock is divided by 2^(BR + 1).
 
 /// The rig, which the emulator's thread and its owner look at in turn.
 pub(crate) type SharedRig = Arc<Mutex<Rig>>;
@@ -51,7 +50,7 @@ pub enum Output {
     StageDuty(f64),
     /// Level of the stage's EN.
     StageEnable(bool),
-    /// What the handheld's buzzer sounds, Hz.
+    /// Tone of the handheld's buzzer, Hz.
     Buzzer(Option<u32>),
 }
 
@@ -172,7 +171,7 @@ impl Rig {
         &mut self.display
     }
 
-    /// What the buzzer sounds now, Hz.
+    /// Sets the buzzer's tone, Hz.
     pub(crate) fn buzzer(&mut self, now_ns: u64, tone: Option<u32>) {
         if tone != self.tone {
             self.tone = tone;
@@ -180,7 +179,7 @@ impl Rig {
         }
     }
 
-    /// How every slide so far was really made.
+    /// The ground truth of every slide so far.
     pub fn slides(&self) -> &[Slide] {
         self.recorder.slides()
     }
@@ -195,7 +194,8 @@ impl Rig {
         self.commands
     }
 
-    /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed counts.
+    /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed
+    /// counts.
     pub fn expect_speed(&mut self, mm_s: f64) {
         self.recorder.expect_speed(mm_s);
     }
@@ -204,7 +204,7 @@ impl Rig {
         self.world.advance_to(now_ns);
     }
 
-    /// Lets time pass and takes note of what is so.
+    /// Lets time pass and records the truth.
     pub(crate) fn tick(&mut self, now_ns: u64) {
         self.world.advance_to(now_ns);
         self.recorder.tick(now_ns, &self.world.truth());
@@ -258,12 +258,12 @@ impl Rig {
         self.update_duty(now_ns);
     }
 
-    /// Where the timer's PWM is in its period, if it makes one.
+    /// Sets the timer's PWM and its place in its period, if it makes one.
     pub(super) fn stage_wave(&mut self, wave: Option<Wave>) {
         self.wave = wave;
     }
 
-    /// What the converter reads of the motor's current.
+    /// Reading of the converter for the motor's current.
     pub(super) fn motor_adc(&mut self, now_ns: u64) -> u16 {
         self.advance_to(now_ns);
         // a port's level does not swing
@@ -306,7 +306,7 @@ impl Rig {
         }
     }
 
-    /// Chip select of a part falls, or rises. Whether a sample command ends with it.
+    /// Chip select of a part falls, or rises. Returns true if a sample command ends with it.
     pub(crate) fn select_part(&mut self, now_ns: u64, part: u8, selected: bool) -> bool {
         let is_there = usize::from(part) < fastest_byte_ns(self.finger).len();
         if !is_there || selected == (self.selected == Some(part)) {
@@ -325,13 +325,14 @@ impl Rig {
         commanded
     }
 
-    /// Whether the pins carry SPI1, and TIM4.
+    /// Connects the pins to SPI1, and to TIM4, or not.
     pub(crate) fn wire(&mut self, sensor: bool, encoder: bool) {
         self.sensor_wired = sensor;
         self.encoder_wired = encoder;
     }
 
-    /// What drives MISO, MOSI, and lines A and B of the encoder, as far as the chip only reads these pins.
+    /// Levels at MISO, MOSI, and lines A and B of the encoder, as far as the chip only reads these pins; `None` if
+    /// nothing drives them.
     pub(super) fn read_pins(&mut self) -> [Option<bool>; 4] {
         let [miso, mosi] = match self.selected {
             Some(_) => self.world.data_lines(),

@@ -1,8 +1,8 @@
-//! How deep the firmware's stack gets, for each exception handler and for the rest of the code.
+//! Depth of the firmware's stack, for each exception handler and for the rest of the code.
 //!
-//! The stack is painted before the first instruction. When a handler begins, what is below its stack pointer is put aside and
-//! painted anew; when it ends, how far the paint is gone is its depth, and what was put aside comes back. So no one counts
-//! what another used.
+//! The stack is painted before the first instruction. When a handler begins, the stack below its stack pointer is put
+//! aside and painted anew; when it ends, its depth is the part of the paint that is gone, and the old contents come
+//! back. So no handler counts the stack of another.
 
 use std::path::Path;
 
@@ -17,17 +17,17 @@ use super::registers::{register, word};
 const PAINT: u32 = 0x7ac7_5afe;
 /// The longest exception frame, with floating-point state and alignment.
 const FRAME: u32 = 0x68 + 4;
-/// How much is looked at first, bytes; it doubles when that is too little. The servo's tick takes 1.4 KB.
+/// Length of the first look, bytes; it doubles when that is too little. The servo's tick takes 1.4 KB.
 const WINDOW: u32 = 2048;
 
-/// How deep a handler went.
+/// The depth of a handler.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct StackLevel {
     /// Its name in the ELF.
     pub name: String,
-    /// Where it begins.
+    /// Its address.
     pub address: u64,
-    /// How often it ran.
+    /// Number of its runs.
     pub runs: u64,
     /// Most bytes below the stack pointer it began with: without its exception frame and without what interrupted it.
     pub deepest: u32,
@@ -47,7 +47,7 @@ impl StackLevel {
     }
 }
 
-/// Where an image has its stack, and its handlers.
+/// The stack of an image, and its handlers.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct StackLayout {
     /// The end of the variables.
@@ -115,7 +115,7 @@ impl StackLayout {
     }
 }
 
-/// What was found.
+/// The use of the stack.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct StackUse {
     /// The handlers.
@@ -141,7 +141,7 @@ pub(crate) struct Stack {
     bottom: u32,
     top: u32,
     found: StackUse,
-    /// with what was below each, the lowest word first
+    /// with the stack below each, the lowest word first
     handlers: Handlers<Vec<u32>>,
 }
 
@@ -187,7 +187,7 @@ impl Stack {
         }
     }
 
-    /// Paints what is below the stack pointer, and gives what was there.
+    /// Paints the stack below the stack pointer, and returns its old contents.
     fn put_aside(&self, level: usize, sp: u32, host: &mut dyn Host) -> Vec<u32> {
         let from = sp
             .saturating_sub(self.found.levels[level].window)
@@ -219,7 +219,7 @@ impl Stack {
         }
     }
 
-    /// What was found so far.
+    /// The use so far.
     pub(crate) fn found(&mut self, host: &mut dyn Host) -> StackUse {
         let painted = painted(self.bottom, self.top, host);
         let thread = self.top - self.bottom - painted;

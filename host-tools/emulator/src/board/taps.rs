@@ -1,4 +1,4 @@
-//! What the rig does round models whose pins it needs to the nanosecond: TIM1, TIM3, TIM4 and ADC1.
+//! The rig's part at models whose pins it needs to the nanosecond: TIM1, TIM3, TIM4 and ADC1.
 
 use rigless::device::{Device, DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange};
 use rigless::soc::RegisterSpec;
@@ -10,19 +10,19 @@ use rigless::time::{EventId, VirtualNanos};
 use super::rig::{SharedRig, lock};
 use super::wave::Wave;
 
-/// What the rig does round a model.
+/// The rig's part at a model.
 pub(super) trait Tap<M> {
-    /// Before the model is read, written or woken: what comes in by its pins up to now.
+    /// Before the model is read, written or woken: brings the inputs at its pins up to now.
     fn before(&mut self, _: &mut M, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
     /// Something was written, or its clock has changed: before [`Tap::after`].
     fn touched(&mut self, _: VirtualNanos) {}
     /// Its clock is so fast from now on, Hz: before [`Tap::touched`].
     fn clocked(&mut self, _: u64) {}
-    /// Whether it has to act on its own event now: a timer that does not catches up when it is looked at next.
+    /// Returns true if it has to act on its own event now: a timer that does not catches up at the next access.
     fn heeds(&mut self, _: &RegisterFile, _: VirtualNanos) -> bool {
         true
     }
-    /// After it: what its pins say now.
+    /// After it: passes on the levels at its pins.
     fn after(&mut self, _: &mut M, _: &RegisterFile, _: VirtualNanos) {}
 }
 
@@ -167,7 +167,7 @@ pub(super) struct Pwm {
     rig: SharedRig,
     touched: Option<VirtualNanos>,
     period: u64,
-    /// What was written has come into force by then, ns.
+    /// Time by which the written values are in force, ns.
     settled: u64,
     /// Of the timer, Hz.
     clock: u64,
@@ -200,8 +200,8 @@ impl Tap<Tim<General>> for Pwm {
         self.clock = hz;
     }
 
-    /// Its edges would stop the core 40 000 times a second. Nobody waits for them but by DIER, and the duty changes only where
-    /// a period begins after something was written.
+    /// Its edges would stop the core 40 000 times a second. The firmware waits for them only by DIER, and the duty
+    /// changes only at the begin of a period after a write.
     fn heeds(&mut self, registers: &RegisterFile, now: VirtualNanos) -> bool {
         now.0 <= self.settled || registers.get(TimRegister::Dier) != 0
     }
@@ -215,7 +215,8 @@ impl Tap<Tim<General>> for Pwm {
             )),
         };
         if let Some(at) = self.touched.take() {
-            // the period under way and the next, by the longer of the old and the new; without a pulse every event counts
+            // the period under way and the next, by the longer of the old and the new; without a pulse every event
+            // counts
             let period = pulse.as_ref().map_or(u64::MAX, |pulse| pulse.period.0);
             let longest = period.max(self.period);
             self.settled = at.0.saturating_add(longest.saturating_mul(2));
@@ -234,7 +235,7 @@ impl Tap<Tim<General>> for Pwm {
     }
 }
 
-/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before anybody looks.
+/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before every read.
 #[derive(Debug)]
 pub(super) struct Encoder {
     pub(super) rig: SharedRig,

@@ -1,4 +1,4 @@
-//! Whether the firmware keeps its appointments: when the sensor's commands end in their slots, and when the servo drives the stage.
+//! Punctuality of the firmware: the ends of the sensor's commands in their slots, and the servo's updates of the stage.
 
 use rigless::emulator::{Access, AccessKind};
 
@@ -8,7 +8,7 @@ const SLOT_COUNTS_PER_US: f64 = 84.0;
 /// TIM3's first compare register: the servo writes the stage's duty there in each of its periods.
 const DUTY: u64 = 0x4000_0434;
 
-/// What was seen of the appointments.
+/// The measured punctuality.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Timing {
     /// Commands that ended.

@@ -5,9 +5,9 @@ use tactus_world::ripple::PwmPhase;
 /// A timer that counts up and begins again, its output high in the first counts.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Wave {
-    /// When its count was looked at, ns.
+    /// Time of the reading of its count, ns.
     pub(super) at_ns: u64,
-    /// What it was.
+    /// The count.
     pub(super) count: u64,
     /// Counts of a period.
     pub(super) counts: u64,
@@ -16,7 +16,7 @@ pub(super) struct Wave {
 }
 
 impl Wave {
-    /// Where in its period it is at a later time; `None` if it stands.
+    /// Its place in its period at a later time; `None` if it stands.
     pub(super) fn phase(&self, now_ns: u64) -> Option<PwmPhase> {
         if self.hz == 0 {
             return None;

@@ -1,4 +1,4 @@
-//! Arguments that several runs take, and what they stand for.
+//! Arguments that several runs take, and their values.
 
 use std::path::PathBuf;
 
@@ -19,8 +19,8 @@ pub struct Firmware {
 }
 
 impl Firmware {
-    /// Its SHA-256, shown before anything is drawn or learned: nobody can say that the firmware was made for the texture.
-    /// What goes to stdout is for people; programs want nothing there but the result.
+    /// Shows its SHA-256 before anything is drawn or learned: this proves that the firmware was not made for the
+    /// texture. On stdout it is for people; programs want nothing there but the result.
     ///
     /// # Errors
     /// [`Error::Read`].
@@ -46,7 +46,7 @@ pub fn hex_sha256(bytes: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Whom a result is for.
+/// The reader of a result.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// For people.
@@ -55,29 +55,29 @@ pub enum Format {
     Json,
 }
 
-/// Why a result is not where it should be.
+/// The reason why a result was not written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
 pub struct WriteError {
     /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// The reason.
     pub source: std::io::Error,
 }
 
-/// Where a result goes.
+/// The place of a result.
 #[derive(Args)]
 pub struct Output {
     /// A table for people, or one JSON object for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// Where the result goes instead of the terminal
+    /// File for the result instead of the terminal
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 impl Output {
-    /// Writes the result as it is wanted.
+    /// Writes the result in its format.
     pub fn write(
         &self,
         text: impl FnOnce() -> String,
@@ -98,29 +98,30 @@ impl Output {
     }
 }
 
-/// The board, and what lies under its finger.
+/// The board, and the texture under its finger.
 #[derive(Args)]
 pub struct World {
-    /// What runs.
+    /// The firmware.
     #[command(flatten)]
     pub firmware: Firmware,
     /// The texture under the finger: its name in Table 1 or its number; drawn by the seed unless given
     #[arg(long, value_name = "NAME")]
     pub texture: Option<String>,
-    /// Let the finger feel recordings of this material of data/biotac instead: its name or its number. The firmware knows
-    /// all 20, from other slides
+    /// Let the finger feel recordings of this material of data/biotac instead: its name or its number. The firmware
+    /// knows all 20, from other slides
     #[arg(long, value_name = "MATERIAL", conflicts_with_all = ["texture", "among", "finger"])]
     pub recording: Option<String>,
-    /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
+    /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load
+    /// cell)
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     pub finger: FingerName,
-    /// How many textures the firmware is to know; the unknown one is among them
+    /// Number of textures that the firmware is to know; the unknown one is among them
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u8).range(2..=117))]
     pub among: u8,
     /// Another seed is another world, another trial, and another texture unless one is given
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// How the firmware decides, and what its table is learned for
+    /// Method by which the firmware decides and its table is learned
     #[arg(long, value_enum, default_value_t = Method::Fused)]
     pub method: Method,
     /// Print the firmware's log to stderr

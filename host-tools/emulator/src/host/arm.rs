@@ -1,5 +1,5 @@
-//! An arm that holds the finger of the emulated board: moved by the simulator's own program, or through a TCP port by a program in
-//! whatever language, as a real arm's controller is by its driver.
+//! An arm that holds the finger of the emulated board: moved by the simulator's own program, or through a TCP port by a
+//! program in any language, as a real arm's controller is by its driver.
 
 use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -42,7 +42,7 @@ impl OnTheLine {
         &mut self.program
     }
 
-    /// Hears what the probe says.
+    /// Takes a report of the probe.
     pub fn hear(&mut self, report: &Report) {
         match &report.event {
             Event::Arm(order) => self.program.ask(*order),
@@ -51,7 +51,7 @@ impl OnTheLine {
         }
     }
 
-    /// What a [`Talk`](super::talk::Talk) calls for each report, and for none after each look.
+    /// Takes each report, and `None` after each look, of a [`Talk`](super::talk::Talk).
     pub fn follow(&mut self, board: &mut Emulator, report: Option<&Report>) {
         match report {
             Some(report) => self.hear(report),
@@ -84,9 +84,9 @@ impl OnTheLine {
     }
 }
 
-/// An arm behind a TCP port. A line "ALONG UP" asks for velocities, mm/s; they hold until the next one, or until the connection ends.
-/// Every 10 ms of the board's time the port says "MS X HEIGHT ALONG": the time, where the finger is on the sample and how high over it,
-/// mm, and how fast it goes along it, mm/s, by the arm's encoders.
+/// An arm behind a TCP port. A line "ALONG UP" commands velocities, mm/s; they hold until the next one, or until the
+/// connection ends. Every 10 ms of the board's time the port sends "MS X HEIGHT ALONG": the time, the finger's place on
+/// the sample and its height over it, mm, and its speed along it, mm/s, by the arm's encoders.
 pub struct ArmPort {
     listener: TcpListener,
     client: Option<(BufReader<TcpStream>, String)>,
@@ -111,7 +111,7 @@ impl ArmPort {
         })
     }
 
-    /// Where it listens.
+    /// Address on which it listens.
     ///
     /// # Errors
     /// The system does not say.
@@ -119,7 +119,7 @@ impl ArmPort {
         self.listener.local_addr()
     }
 
-    /// Takes what has come, and says where the arm is: to be called every ms. An arm without a driver stands.
+    /// Takes the received commands, and sends the arm's state: to be called every ms. An arm without a driver stands.
     pub fn look(&mut self, board: &mut Emulator) {
         if let Ok((stream, _)) = self.listener.accept()
             && stream.set_nonblocking(true).is_ok()

@@ -1,4 +1,4 @@
-//! Explorations by the firmware, judged by the rig's truth and by the PC that follows them.
+//! Explorations by the firmware, compared with the rig's truth and with the PC that follows them.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +16,9 @@ use super::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::board::referee::Violation;
 use crate::board::{self, Emulator, Slide};
 
+/// Samples that the sensor sees at boot, while the firmware finds out which finger there is; 14 of an MCP3202, which
+/// takes every command for one of its own.
+const ASKED_AT_BOOT: u64 = 16;
 /// A whole exploration, virtual seconds.
 const EXPLORATION_S: f64 = 600.0;
 
@@ -28,11 +31,11 @@ pub const SPEED_SHARE: f64 = 0.01;
 /// Largest deviation of a slot from its grid, us.
 pub const JITTER_US: f64 = 2.0;
 
-/// Why there is no exploration to judge.
+/// Reasons why there is no exploration to judge.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExploreError {
-    /// The firmware did not do what it was asked for.
+    /// The firmware did not carry out a request.
     #[error(transparent)]
     Talk(#[from] TalkError),
     /// The table cannot be read.
@@ -49,17 +52,17 @@ impl From<board::Error> for ExploreError {
     }
 }
 
-/// What a slide said, beside what is learned of the true texture.
+/// The features of a slide, beside the learned ones of the true texture.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Step {
     /// The movement.
     pub movement: Option<Movement>,
-    /// What was looked at.
+    /// The action.
     pub action: Action,
-    /// The properties that were looked at, with their values; all where the action looks at everything.
+    /// The observed properties with their values; all where the action looks at everything.
     pub observed: Vec<(Property, f32)>,
-    /// How far the observation is from what was learned of the true texture, in standard deviations: the root of the mean
-    /// square over all that was looked at, about 1 if it is that texture. `None` where nothing was learned.
+    /// Distance of the observation from the learned mean of the true texture, in standard deviations: the root of the
+    /// mean square over all observed features, about 1 if it is that texture. `None` if nothing was learned.
     pub distance_sd: Option<f32>,
     /// Posterior probability of the true texture.
     pub probability: f32,
@@ -78,12 +81,12 @@ pub struct Other {
     pub distance_sd: Option<f32>,
 }
 
-/// An exploration, as the firmware reported it and as it really was.
+/// An exploration, as the firmware reported it and in truth.
 #[derive(Clone, Debug)]
 pub struct Exploration {
     /// Name of the texture under the finger.
     pub truth: String,
-    /// Whether the table has it.
+    /// True if the table has it.
     pub known: bool,
     /// The verdict.
     pub found: Verdict,
@@ -91,30 +94,30 @@ pub struct Exploration {
     pub learned: u8,
     /// From power-up to the end, virtual seconds.
     pub virtual_s: f64,
-    /// How every slide was really made, and what it should have been.
+    /// The ground truth of every slide, and its movement.
     pub slides: Vec<(Movement, Slide)>,
-    /// What every slide that counted said.
+    /// The features of every slide that counted.
     pub steps: Vec<Step>,
-    /// What the firmware counted.
+    /// The firmware's counters.
     pub counts: Counts,
-    /// Sample commands that the sensor got, before and after the firmware was asked what it counted.
+    /// Sample commands that the sensor got, before and after the firmware's counters were read.
     pub commands: (u64, u64),
     /// Resets since power-up.
     pub resets: usize,
-    /// How well the PC agrees.
+    /// The PC's agreement.
     pub agreement: Agreement,
-    /// What the PC could not compare.
+    /// The parts that the PC could not compare.
     pub not_followed: Vec<String>,
     /// Reports that came damaged or not at all.
     pub lost_reports: u64,
-    /// What was played of recordings, all 0 without any.
+    /// Counts of the recordings played, all 0 without any.
     pub played: PlayCounts,
-    /// What the firmware did since power-up that the chip's vendor does not allow.
+    /// The firmware's violations of the vendor's rules since power-up.
     pub violations: Vec<Violation>,
 }
 
-/// Has the firmware find out what lies under its finger, and follows it. It must know `table` and be ready; `each` sees all
-/// reports meanwhile, and after every millisecond none.
+/// Has the firmware identify the texture under its finger, and follows it. It must know `table` and be ready; `each`
+/// gets all reports meanwhile, and `None` after every millisecond.
 pub fn explore(
     talk: &mut Talk,
     table: &[u8],
@@ -258,7 +261,7 @@ fn distance_sd(
     mean.is_finite().then(|| mean.sqrt())
 }
 
-/// Where a slide's force is off most: N, relative, and whether that is too much.
+/// Largest error of a slide's force: N, relative, and true if it is too large.
 fn force_error(slides: &[(Movement, Slide)]) -> (f64, f64, bool) {
     let errors = slides.iter().map(|(movement, slide)| {
         let wanted = f64::from(movement.force_n());
@@ -276,7 +279,7 @@ fn force_error(slides: &[(Movement, Slide)]) -> (f64, f64, bool) {
 }
 
 impl Exploration {
-    /// Whether the verdict is the texture under the finger, or that the table does not have it, and so it is.
+    /// Returns true if the verdict is the texture under the finger, or is right that the table does not have it.
     pub fn right(&self) -> bool {
         if self.found.unknown {
             !self.known
@@ -285,7 +288,7 @@ impl Exploration {
         }
     }
 
-    /// Whether the PC came to the same, from the raw samples.
+    /// Returns true if the PC has the same result, from the raw samples.
     pub fn follows(&self) -> bool {
         self.agreement.agrees() && self.not_followed.is_empty()
     }
@@ -296,7 +299,7 @@ impl Exploration {
         (newtons, share)
     }
 
-    /// Of each slide, by how much of it its force is off.
+    /// Error of the force of each slide.
     fn force_errors(&self) -> Vec<f64> {
         let each = self.slides.iter();
         let each = each
@@ -329,7 +332,7 @@ impl Exploration {
         self.agreement.properties.max(self.agreement.signal)
     }
 
-    /// The bars that were missed, whatever the verdict; none if all is well. The rig has no fault: every sample that is
+    /// The limits that were missed, for any verdict; none if all is well. The rig has no fault: every sample that is
     /// lost, late or damaged is the firmware's.
     pub fn missed(&self) -> Vec<String> {
         let mut missed = Vec::new();
@@ -370,8 +373,10 @@ impl Exploration {
             ),
         );
         let slots = u64::from(counts.slots);
-        // a slot is counted before its command goes out
-        let possible = self.commands.0..=self.commands.1 + u64::from(counts.late_slots) + 1;
+        // a slot is counted before its command goes out; while the finger is looked for, its part is asked outside of
+        // slots
+        let least = self.commands.0.saturating_sub(ASKED_AT_BOOT);
+        let possible = least..=self.commands.1 + u64::from(counts.late_slots) + 1;
         check(
             possible.contains(&slots),
             format!("slots told: {slots}, the sensor saw {possible:?}"),
@@ -471,7 +476,7 @@ impl Exploration {
         json
     }
 
-    /// When and by which property the exploration went where it went, a line for each slide.
+    /// Time and property of each step of the exploration, a line for each slide.
     pub fn log(&self) -> Vec<String> {
         let lines = self.steps.iter().zip(1..).map(|(step, number)| {
             let movement = step.movement.map_or("?".into(), |m| m.to_string());
@@ -499,7 +504,7 @@ impl Exploration {
         lines.collect()
     }
 
-    /// How well the PC agrees, for people.
+    /// The PC's agreement, for people.
     pub fn followed(&self) -> String {
         let agreement = &self.agreement;
         format!(

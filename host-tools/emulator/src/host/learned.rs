@@ -1,4 +1,4 @@
-//! What is under the finger, and what the firmware is given beforehand: learned once for a world, then kept in a file.
+//! The texture under the finger, and the firmware's table: learned once for a world, then kept in a file.
 
 use std::path::{Path, PathBuf};
 
@@ -13,17 +13,17 @@ use tactus_lab::sim::recorded::RecordedTexture;
 
 use super::args::{World, hex_sha256};
 use super::progress;
-use super::under_finger::{self, Known, KnownError, TRIALS, Unknown};
+use super::under_finger::{self, FirmwareData, KnownError, TRIALS, Unknown};
 
-/// Where the textures come from.
+/// The source of the textures.
 enum Textures {
     Simulated(FingerName, Collection),
     Recorded(RecordedTexture),
 }
 
-/// What the seed draws.
+/// The draws of the seed.
 pub struct Chosen {
-    /// What lies under the finger.
+    /// The texture under the finger.
     pub unknown: Unknown,
     /// For the firmware's own draws.
     pub seed: u32,
@@ -31,7 +31,7 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    /// Draws what the arguments leave open.
+    /// Draws the values that the arguments leave open.
     pub fn new(cli: &World) -> Result<Self, KnownError> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
@@ -64,7 +64,7 @@ impl Chosen {
     }
 
     /// Calibration of the rig and table of the textures for a method, or the table of a file.
-    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<Known, KnownError> {
+    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<FirmwareData, KnownError> {
         let kept = self.kept_in(method);
         let mut known = match kept.as_deref().and_then(read) {
             Some(known) => known,
@@ -86,7 +86,7 @@ impl Chosen {
         Ok(known)
     }
 
-    fn learn_anew(&self, method: Method) -> Result<Known, KnownError> {
+    fn learn_anew(&self, method: Method) -> Result<FirmwareData, KnownError> {
         let bar;
         let known = match &self.textures {
             Textures::Simulated(finger, collection) => {
@@ -110,8 +110,8 @@ impl Chosen {
         Ok(known)
     }
 
-    /// A file named for all that the table depends on: the world, and this program, which holds core and simulator. None
-    /// for recordings: what they hold is not in their name.
+    /// A file named for all that the table depends on: the world, and this program, which holds core and simulator.
+    /// None for recordings: their contents are not in their name.
     fn kept_in(&self, method: Method) -> Option<PathBuf> {
         let Textures::Simulated(finger, collection) = &self.textures else {
             return None;
@@ -128,20 +128,17 @@ impl Chosen {
     }
 }
 
-/// Bytes of constants of a finger that was not turned over ([`RigCalibration::to_bytes`]).
-const CALIBRATION_BYTES: usize = 60;
-
-fn read(file: &Path) -> Option<Known> {
+fn read(file: &Path) -> Option<FirmwareData> {
     let bytes = std::fs::read(file).ok()?;
-    let (calibration, table) = bytes.split_at_checked(CALIBRATION_BYTES)?;
+    let (calibration, table) = bytes.split_at_checked(RigCalibration::BYTES)?;
     Table::read(table).ok()?;
-    Some(Known {
+    Some(FirmwareData {
         calibration: RigCalibration::from_bytes(calibration).ok()?,
         table: table.into(),
     })
 }
 
-fn write(file: &Path, known: &Known) -> std::io::Result<()> {
+fn write(file: &Path, known: &FirmwareData) -> std::io::Result<()> {
     if let Some(folder) = file.parent() {
         std::fs::create_dir_all(folder)?;
     }

@@ -1,4 +1,4 @@
-//! A person who holds the emulated handheld and does what its display says, while a host talks to it.
+//! A person who holds the emulated handheld and follows its display, while a host talks to it.
 
 use tactus_core::wire::{Event, Prompt, Report};
 use tactus_lab::sim::scenario::Step;
@@ -6,7 +6,7 @@ use tactus_world::person::{Hand, Manner};
 
 use crate::board::{Display, Emulator};
 
-/// What the display shows when it wants a press, and a slide.
+/// Texts of the display when it wants a press, and a slide.
 const PRESS: &str = "slide ";
 const SLIDE: &str = "5 cm in 2 s";
 const LIFT: &str = "Lift";
@@ -28,7 +28,7 @@ fn weight(shows: impl Fn(&str) -> bool) -> Option<u16> {
     weights.find_map(|(grams, mn)| shows(grams).then_some(mn))
 }
 
-/// What the person is at, and until when, ns.
+/// The person's action, and its end, ns.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum At {
     Idle,
@@ -50,11 +50,11 @@ pub struct Person {
     weight: Option<u16>,
     /// Slides made.
     slides: u32,
-    /// When the display is looked at next, ns.
+    /// Time of the next look at the display, ns.
     looks_ns: u64,
 }
 
-/// How often the person looks, ns.
+/// Interval between two looks, ns.
 const LOOK_NS: u64 = 20_000_000;
 
 impl Person {
@@ -81,7 +81,7 @@ impl Person {
         self.pace_mm_s = pace_mm_s;
     }
 
-    /// Whether the hand is free: it neither presses nor is on its way.
+    /// Returns true if the hand is free: it neither presses nor is on its way.
     pub fn is_idle(&self) -> bool {
         self.at == At::Idle
     }
@@ -91,7 +91,8 @@ impl Person {
         self.slides
     }
 
-    /// Hears what the probe tells its host: which weight to put on the finger, where it is none that a person has at hand.
+    /// Takes a report of the probe to its host: the weight to put on the finger, if it is one that a person does not
+    /// have at hand.
     pub fn hear(&mut self, report: &Report) {
         if let Event::Prompt(prompt) = report.event {
             self.weight = match prompt {
@@ -101,7 +102,7 @@ impl Person {
         }
     }
 
-    /// Looks at the display and goes on: to be called every few ms, whatever the host does.
+    /// Looks at the display and continues: to be called every few ms, under any host.
     pub fn look(&mut self, board: &mut Emulator) {
         let now = board.now_ns();
         if now < self.looks_ns {
@@ -149,7 +150,7 @@ impl Person {
             at => (at, None),
         };
         self.at = at;
-        // as long as the display says nothing else, it stays as it is
+        // while the display shows the same, the probe is not turned back
         let turned = turned.or((at == At::Pressing).then_some(false));
         if let Some(over) = turned
             && let Some(hand) = board.rig().world().hand()

@@ -1,5 +1,6 @@
-//! The power is cut while the firmware stores something: the flash that is left, of which the last write is torn. The firmware
-//! stores once without a cut, and [`Emulator::store_writes`] has every word that it programs and every sector that it erases.
+//! The power is cut while the firmware stores something: the flash that is left, of which the last write is torn. The
+//! firmware stores once without a cut, and [`Emulator::store_writes`] has every word that it programs and every sector
+//! that it erases.
 //!
 //! [`Emulator::store_writes`]: crate::board::Emulator::store_writes
 
@@ -8,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::board::{FlashWrite, places};
 
-/// How a write is torn.
+/// The torn state of a write.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Torn {
     /// It had not begun.
@@ -31,7 +32,7 @@ impl Torn {
 pub struct Cut {
     /// Writes before it.
     pub at: usize,
-    /// What is left of it.
+    /// The torn state of that write.
     pub torn: Torn,
     /// For the bits.
     pub seed: u64,

@@ -1,15 +1,15 @@
-//! What people see on stderr while a run takes its time.
+//! Progress of a run on stderr, for people.
 
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A line that says what is being done.
+/// A line that names the current work.
 pub fn spinner(what: &'static str) -> ProgressBar {
     ticking(ProgressBar::new_spinner().with_message(what))
 }
 
-/// A bar up to `length`; `left` is what stands behind its numbers, in indicatif's template language.
+/// A bar up to `length`; `left` is the text behind its numbers, in indicatif's template language.
 pub fn bar(what: &'static str, length: u64, left: &str) -> ProgressBar {
     let style =
         ProgressStyle::with_template(&format!("{{msg}} {{wide_bar}} {{pos}}/{{len}}{left}"))

@@ -12,28 +12,28 @@ use tactus_link::{LinkError, OperationError, PortError, Probe, PushTable, Reques
 
 use crate::board::{Emulator, Error};
 
-/// How far the board runs between two looks at the line, ns, unless told otherwise.
+/// Default time that the board runs between two looks at the line, ns.
 const STEP_NS: u64 = 1_000_000;
 /// Longest that anything but explorations and training takes, virtual seconds.
 pub const TIMEOUT_S: f64 = 60.0;
 
-/// Why the firmware does not do what it is asked for.
+/// Reasons why the firmware did not carry out a request.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TalkError {
     /// The emulator.
     #[error(transparent)]
     Emulator(#[from] Error),
-    /// It says why.
+    /// The firmware refused it; its reason.
     #[error("the firmware refuses: {0}")]
     Refused(String),
-    /// It has started anew meanwhile.
+    /// The firmware has restarted meanwhile.
     #[error("the firmware restarted instead of answering ({0:?})")]
     Rebooted(Reset),
     /// The operation, otherwise.
     #[error(transparent)]
     Operation(OperationError),
-    /// It says nothing more.
+    /// The firmware does not answer any more.
     #[error(
         "no answer from the firmware in {0} virtual seconds: does this ELF speak the protocol? See its log with --log"
     )]
@@ -135,7 +135,7 @@ impl Talk {
         Ok(reports)
     }
 
-    /// Runs the board until `pick` makes something of a report; `each` sees all of them, and after every look none.
+    /// Runs the board until `pick` returns a value for a report; `each` gets all of them, and `None` after every look.
     ///
     /// # Errors
     /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
@@ -221,8 +221,8 @@ impl Talk {
         self.run(Request::command(command), timeout_s, each)
     }
 
-    /// Waits until the firmware has booted and found the limit switches. A fault of that is given back, after it has
-    /// been asked to home again.
+    /// Waits until the firmware has booted and found the limit switches. Returns a fault of that, after another request
+    /// to home.
     pub fn ready(
         &mut self,
         mut each: impl FnMut(&mut Emulator, Option<&Report>),
@@ -238,7 +238,7 @@ impl Talk {
         Ok(fault)
     }
 
-    /// Gives the firmware calibration and table, which it keeps.
+    /// Sends the firmware calibration and table, which it keeps.
     pub fn teach(
         &mut self,
         calibration: &RigCalibration,

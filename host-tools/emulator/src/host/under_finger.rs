@@ -1,4 +1,4 @@
-//! What lies under the finger, and what the firmware is given beforehand.
+//! The texture under the finger, and the data for the firmware.
 
 use std::path::PathBuf;
 
@@ -15,18 +15,18 @@ use crate::board::{Emulator, Error, Options};
 
 /// Trials of each texture and movement (PAPER: five).
 pub const TRIALS: u32 = 5;
-/// What recordings cannot show.
-pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold is clipped; learned and explored \
-     slides are of one session (interleaved).";
+/// Limits of recordings.
+pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold \
+     is clipped; learned and explored slides are of one session (interleaved).";
 
-/// Why there is nothing to learn, or nothing under the finger.
+/// Reasons why there is nothing to learn, or no texture under the finger.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KnownError {
     /// There are no recordings.
     #[error(
-        "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and set \
-         TACTUS_DATA to the folder that holds biotac/",
+        "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and \
+         set TACTUS_DATA to the folder that holds biotac/",
         .0.display()
     )]
     NoData(PathBuf),
@@ -46,29 +46,29 @@ pub enum KnownError {
     Table {
         /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// There is no such texture in the recordings.
     #[error("no material {name}; there are {known}, or give a number from 1")]
     NoMaterial {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
-        /// What there is.
+        /// The names that exist.
         known: String,
     },
 }
 
-/// What the firmware is given.
+/// The firmware's calibration and table.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Known {
+pub struct FirmwareData {
     /// Constants of the rig.
     pub calibration: RigCalibration,
     /// The texture table.
     pub table: Vec<u8>,
 }
 
-/// What lies under the finger.
+/// The texture under the finger.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     /// Its name in the table.
@@ -90,12 +90,12 @@ impl Unknown {
     }
 }
 
-/// Learns the textures of a simulated world for a method; `done` hears of each.
+/// Learns the textures of a simulated world for a method; `done` is called after each.
 pub fn simulated(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, KnownError> {
+) -> Result<FirmwareData, KnownError> {
     simulated_with(FingerName::Biotac, collection, method, done)
 }
 
@@ -105,26 +105,26 @@ pub fn simulated_with(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, KnownError> {
+) -> Result<FirmwareData, KnownError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let setup = collection.setup_with(finger, first, 0);
     let calibration = calibrated(setup).map_err(LearnError::from)?;
     let movements = &Collection::MOVEMENTS;
     let table = collection.learn_with(finger, movements, method, calibration, done)?;
-    Ok(Known { calibration, table })
+    Ok(FirmwareData { calibration, table })
 }
 
-/// As [`simulated`], with what slides say before their end: the rig's image ends them as soon as it is certain.
+/// As [`simulated`], with statistics of shorter slides: the rig's image ends slides as soon as it is certain.
 pub fn simulated_early(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<Known, KnownError> {
+) -> Result<FirmwareData, KnownError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
     let lengths_ms = &Collection::LENGTHS_MS;
     let table = collection.learn_lengths(method, calibration, lengths_ms, done)?;
-    Ok(Known { calibration, table })
+    Ok(FirmwareData { calibration, table })
 }
 
 /// A texture of a simulated world in a trial that nothing was learned from: those from 1 on.
@@ -146,8 +146,8 @@ pub fn mounted_with(
     }
 }
 
-/// How many recorded slides of each material the table is learned from; the unknown texture plays the others. The paper's
-/// method takes the standard deviation of a few trials for the truth: with five it is wrong too often.
+/// Number of recorded slides of each material that the table is learned from; the unknown texture plays the others. The
+/// paper's method takes the standard deviation of a few trials for the truth: with five it is wrong too often.
 fn recorded_trials(method: Method) -> usize {
     match method {
         Method::Paper => 15,
@@ -175,13 +175,16 @@ pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownErr
 }
 
 /// Learns the recorded textures for a method.
-pub fn recorded(recorded_texture: &RecordedTexture, method: Method) -> Result<Known, KnownError> {
+pub fn recorded(
+    recorded_texture: &RecordedTexture,
+    method: Method,
+) -> Result<FirmwareData, KnownError> {
     let calibration = calibrated(RecordedTexture::setup(0)).map_err(LearnError::from)?;
     let table = recorded_texture.learn(method, calibration)?;
-    Ok(Known { calibration, table })
+    Ok(FirmwareData { calibration, table })
 }
 
-/// Number of a material by its name, whatever the case, or by its number from 1.
+/// Number of a material by its name, in any case, or by its number from 1.
 ///
 /// # Errors
 /// [`KnownError::NoMaterial`].

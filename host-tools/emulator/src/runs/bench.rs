@@ -7,12 +7,11 @@ pub(crate) mod error;
 mod gates;
 mod inputs;
 mod on_the_rig;
-mod plot;
 mod row;
 #[path = "../../../../firmware/src/bench/workload.rs"]
 pub mod workload;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args as Arguments;
@@ -25,9 +24,8 @@ use tactus_lab::sim::collection::Collection;
 use self::counter::Bench;
 use self::error::BenchError;
 use self::gates::{GATES, gate};
-use self::inputs::{SLIDE, Wanted, corners, extremes, observed, of_gates, slide, synthetic};
+use self::inputs::{SLIDE, Wanted, extremes, observed, of_gates, slide};
 use self::on_the_rig::on_the_rig;
-use self::plot::{Curve, draw};
 use self::row::{Row, print};
 use self::workload::Workload;
 use super::error::RunError;
@@ -48,12 +46,6 @@ pub(crate) struct Args {
     /// For people, or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// Tell how table and decision grow with the number of textures instead
-    #[arg(long)]
-    growth: bool,
-    /// With --growth, draw that as SVG, too
-    #[arg(long, value_name = "FILE", requires = "growth")]
-    plot: Option<PathBuf>,
 }
 
 /// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
@@ -85,10 +77,6 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         return Ok(rows.iter().all(Row::ok));
     }
     let mut bench = Bench::start(&args.firmware.elf, false)?;
-    if args.growth {
-        return growth(&mut bench, args.plot.as_deref());
-    }
-    corners(&mut bench)?;
     extremes(&mut bench)?;
     if text {
         bench = Bench::start(&args.firmware.elf, true)?;
@@ -254,54 +242,4 @@ fn look(bench: &mut Bench) -> Result<Row, BenchError> {
     let table = know_lengths(&whole, &lengths).map_err(TableError::from)?;
     let name = "a look at a slide, fused";
     Kernel::new(name, "117 textures", Workload::Look, &table, &words).count(bench)
-}
-
-/// Table bytes, and instructions of a fused decision of three movements after a typical slide.
-fn growth(bench: &mut Bench, plot: Option<&Path>) -> Result<bool, BenchError> {
-    println!(
-        "{:>8} {:>12} {:>12} {:>6} {:>12}",
-        "textures", "table bytes", "posterior", "live", "choice"
-    );
-    let mut equal = true;
-    let mut curves = [
-        "table, KB",
-        "posterior, thousands of instructions",
-        "choice among up to 50 live, thousands",
-    ]
-    .map(|name| -> Curve { (name, Vec::new()) });
-    for textures in [20, 117, 500, workload::MOST_TEXTURES, 2000] {
-        let table = synthetic(Method::Fused, textures)?;
-        curves[0]
-            .1
-            .push((textures as f64, table.len() as f64 / 1024.0));
-        if textures > workload::MOST_TEXTURES {
-            println!(
-                "{textures:>8} {:>12}   more than the chip's RAM has room for",
-                table.len()
-            );
-            continue;
-        }
-        let observed = observed(&table, Method::Fused, textures.min(50))?;
-        let posterior = bench.count(Workload::Observe, &table, &observed.words)?;
-        let choice = bench.count(Workload::Choice, &table, &observed.words)?;
-        equal &= posterior.equal && choice.equal;
-        println!(
-            "{textures:>8} {:>12} {:>12} {:>6} {:>12}",
-            table.len(),
-            posterior.instructions,
-            observed.live,
-            choice.instructions
-        );
-        let counts = [posterior, choice].map(|counted| counted.instructions as f64 * 1e-3);
-        for ((_, points), y) in curves.iter_mut().skip(1).zip(counts) {
-            points.push((textures as f64, y));
-        }
-    }
-    if let Some(file) = plot {
-        draw(file, &curves)?;
-    }
-    if !equal {
-        return Err(BenchError::Different(vec!["a decision".into()]));
-    }
-    Ok(true)
 }

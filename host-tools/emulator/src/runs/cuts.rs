@@ -27,7 +27,7 @@ use crate::board::{FlashWrite, Options};
 use crate::host::exploration::{Exploration, explore};
 use crate::host::power_cut::{Cut, Torn, left_by};
 use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
-use crate::host::under_finger::{self, Known, Unknown};
+use crate::host::under_finger::{self, FirmwareData, Unknown};
 
 /// The texture under the finger, which the table has.
 const TEXTURE: u8 = 47;
@@ -71,7 +71,7 @@ pub(crate) fn prepare(
     each("a board finds its switches");
     let mut talk = boot(elf, &unknown, None)?;
     talk.ready(|_, _| ())?;
-    let Known { calibration, table } = &known;
+    let FirmwareData { calibration, table } = &known;
     talk.teach(calibration, table, |_, _| ())?;
     each("it learns by itself");
     let update = noted_update("update", &mut talk, &unknown, |_| true)?;

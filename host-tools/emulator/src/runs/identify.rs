@@ -14,9 +14,9 @@ use crate::board::{self, Emulator, Options};
 use crate::host::args::{Format, World};
 use crate::host::exploration::{self, ExploreError};
 use crate::host::learned::Chosen;
+use crate::host::milestones::Milestones;
 use crate::host::progress;
 use crate::host::talk::Talk;
-use crate::host::milestones::Milestones;
 use crate::host::under_finger::RECORDED_LIMITS;
 
 /// What is identified, and how.

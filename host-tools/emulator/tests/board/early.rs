@@ -7,7 +7,7 @@ use tactus_core::explorer::Method;
 use tactus_core::wire::{Event, Identify, Phase};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::milestones::Milestones;
-use tactus_emulator::host::under_finger::{self, Known};
+use tactus_emulator::host::under_finger::{self, FirmwareData};
 use tactus_lab::eval::learn::know_lengths;
 use tactus_lab::sim::collection::Collection;
 use tactus_world::faults::Fault;
@@ -15,14 +15,14 @@ use tactus_world::faults::Fault;
 use crate::common::{boot, elf};
 
 /// A world of so many textures that holds this one, and what is learned of it with and without lengths.
-fn world(seed: u64, texture: u8, among: u8) -> (Collection, [Known; 2]) {
+fn world(seed: u64, texture: u8, among: u8) -> (Collection, [FirmwareData; 2]) {
     let collection = Collection {
         seed,
         textures: Collection::spread(texture, among),
         trials: 5,
     };
     let early = under_finger::simulated_early(&collection, Method::Fused, || ()).unwrap();
-    let whole = Known {
+    let whole = FirmwareData {
         table: know_lengths(&early.table, &[]).unwrap(),
         ..early.clone()
     };
@@ -41,7 +41,7 @@ struct Seen {
     seconds_to_verdict: f64,
 }
 
-fn seen(elf: &Path, world: &Collection, known: &Known, texture: u8) -> Seen {
+fn seen(elf: &Path, world: &Collection, known: &FirmwareData, texture: u8) -> Seen {
     let unknown = under_finger::mounted(world, texture, 7);
     let mut talk = boot(elf, &unknown, None);
     talk.teach(&known.calibration, &known.table, |_, _| ())
@@ -191,44 +191,4 @@ fn the_guard_trips_while_a_slide_is_ended() {
     let truth = talk.board().rig().world().truth();
     assert!(truth.force_max_n < 2.2, "{truth:?}");
     assert!(truth.speed_mm_s.abs() < 0.5, "{truth:?}");
-}
-
-/// How much sooner a person knows, over 20 worlds: `cargo test --release --test board early:: -- --ignored --nocapture` in this folder, with
-/// the ELF of `cargo xtask size` in `TACTUS_ELF`.
-#[test]
-#[ignore = "20 worlds take a quarter of an hour"]
-fn verdicts_come_sooner() {
-    let Some(elf) = elf() else { return };
-    let mut before_after = [Vec::new(), Vec::new()];
-    let (mut right, mut wrong, mut ended) = ([0; 2], [0; 2], 0);
-    for seed in 1..=20 {
-        let texture = (seed * 37 % 117) as u8 + 1;
-        let (collection, known) = world(seed, texture, 20);
-        let both = std::thread::scope(|scope| {
-            let both = known.each_ref().map(|known| {
-                let (elf, collection) = (&elf, &collection);
-                scope.spawn(move || seen(elf, collection, known, texture))
-            });
-            both.map(|one| one.join().unwrap())
-        });
-        for (n, seen) in both.iter().enumerate() {
-            assert_eq!(seen.explored.missed(), [""; 0], "seed {seed}");
-            assert!(seen.most_n < 2.2, "{} N, seed {seed}", seen.most_n);
-            before_after[n].push(seen.seconds_to_verdict);
-            let sure = seen.explored.found.sure;
-            right[n] += u32::from(sure && seen.explored.right());
-            wrong[n] += u32::from(sure && !seen.explored.right());
-        }
-        ended += both[1].early.len();
-        let [before, after] = both.map(|seen| seen.seconds_to_verdict);
-        println!("seed {seed}: {before:.2} s, {after:.2} s");
-    }
-    let [before, after] = before_after.map(|mut all| {
-        all.sort_by(f64::total_cmp);
-        f64::midpoint(all[9], all[10])
-    });
-    println!(
-        "median of 20: {before:.2} s before, {after:.2} s after; {ended} ended early; right {right:?}, wrong when sure {wrong:?}"
-    );
-    assert!(after < before);
 }

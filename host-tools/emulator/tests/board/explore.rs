@@ -8,7 +8,7 @@ use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Report, Train};
 use tactus_emulator::host::exploration::explore;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
-use tactus_emulator::host::under_finger::{self, Known, Unknown};
+use tactus_emulator::host::under_finger::{self, FirmwareData, Unknown};
 use tactus_emulator::runs::campaign;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::sim::collection::Collection;
@@ -18,8 +18,8 @@ use tactus_world::world::Setup;
 use crate::common::{boot, elf};
 
 /// A simulated world of six textures.
-pub(crate) fn world() -> &'static (Collection, Known) {
-    static WORLD: OnceLock<(Collection, Known)> = OnceLock::new();
+pub(crate) fn world() -> &'static (Collection, FirmwareData) {
+    static WORLD: OnceLock<(Collection, FirmwareData)> = OnceLock::new();
     WORLD.get_or_init(|| {
         let collection = Collection {
             seed: 3,

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Method, Strategy};
 use tactus_core::features::{FeatureSet, Measurement, Observation, Slide};
 use tactus_core::rig::calibration::{LineFit, RigCalibration};
@@ -479,7 +479,7 @@ fn slides_that_are_recorded_by_hand_are_learned_pushed_and_known() {
 
 fn measured(slide: &Recording) -> Measurement {
     let plan = Plan::new();
-    let mut samples = Slide::<Plain>::new(&plan, slide.movement);
+    let mut samples = Slide::new(&plan, slide.movement);
     slide.play(&mut samples);
     samples.finish().unwrap()
 }

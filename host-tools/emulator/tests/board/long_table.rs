@@ -10,15 +10,15 @@ use tactus_core::wire::{Command, Failure, Forget, Identify, MemoryError, Train};
 use tactus_emulator::board::{FlashWrite, places};
 use tactus_emulator::host::power_cut::{Cut, Torn, left_by};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
-use tactus_emulator::host::under_finger::{self, Known, Unknown};
+use tactus_emulator::host::under_finger::{self, FirmwareData, Unknown};
 use tactus_lab::sim::collection::{Collection, calibrated};
 use tactus_link::{PushTable, ReadTable, Request};
 use tactus_world::person::Manner;
 
 use crate::changed_cuts::reboot;
 use crate::common::{boot, elf, elf_of};
+use crate::damaged_store::troubles;
 use crate::handheld_link::Held;
-use crate::old_store::troubles;
 
 /// The texture under the finger, which the tables have.
 const TEXTURE: u8 = 47;
@@ -41,7 +41,7 @@ fn under_finger() -> Unknown {
 }
 
 /// Tables of 24 movements, and of the usual three.
-fn tables() -> (Known, Vec<u8>) {
+fn tables() -> (FirmwareData, Vec<u8>) {
     let short = under_finger::simulated(&world(), Method::Fused, || ()).unwrap();
     let movements: Vec<Movement> = Movement::grid().take(24).collect();
     let calibration = calibrated(world().setup(world().textures[0], 0)).unwrap();

@@ -73,8 +73,8 @@ fn explore(held: &mut Held, table: &[u8], pace_mm_s: f64) -> (Vec<f64>, String) 
     let mut speeds = Vec::new();
     for report in &held.reports {
         follower.hear(&report.event).unwrap();
-        if let Event::Pace(pace) = report.event {
-            speeds.push((f64::from(pace) / 1024.0).exp());
+        if let Event::SlideReport { observed, .. } = &report.event {
+            speeds.extend(observed.pace.map(|pace| (f64::from(pace) / 1024.0).exp()));
         }
     }
     let agreement = follower.agreement();

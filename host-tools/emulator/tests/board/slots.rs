@@ -23,6 +23,9 @@ const GAP_US: u32 = 50;
 /// By now RAM has its initial values, and no slot has begun: the sensor starts for 100 ms.
 const BEFORE_SLOTS_MS: u64 = 50;
 
+/// Commands that it gets before the slots, while the firmware finds out that it is a BioTac.
+const LOOKED: u64 = 5;
+
 /// Complaints: an answer that was read too early, a read without a command.
 const TOO_EARLY: u8 = 0x2D;
 const NOT_ASKED: u8 = 0x5F;
@@ -200,7 +203,7 @@ fn a_slot_without_its_select_is_heard_by_nobody() {
             write(board, place + SELECT_AT, &[0], &[1]);
         }
     });
-    assert_eq!(commands, 0);
+    assert!(commands <= LOOKED, "{commands}");
     let [(NOT_ASKED, times)] = complaints[..] else {
         panic!("{complaints:?}")
     };

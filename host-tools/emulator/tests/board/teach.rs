@@ -9,7 +9,7 @@ use tactus_core::table::{Name, Table, Tally};
 use tactus_core::wire::{Event, Forget, Identify, Status, TextureLearned, Train, Verdict};
 use tactus_emulator::host::exploration::{Exploration, explore};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
-use tactus_emulator::host::under_finger::{self, Known, Unknown};
+use tactus_emulator::host::under_finger::{self, FirmwareData, Unknown};
 use tactus_lab::sim::collection::Collection;
 use tactus_link::{ReadTable, Request};
 
@@ -23,8 +23,8 @@ const OLD: u8 = 47;
 const LONG_S: f64 = 300.0;
 
 /// A simulated world of eight textures without [`NEW`].
-fn world() -> &'static (Collection, Known) {
-    static WORLD: OnceLock<(Collection, Known)> = OnceLock::new();
+fn world() -> &'static (Collection, FirmwareData) {
+    static WORLD: OnceLock<(Collection, FirmwareData)> = OnceLock::new();
     WORLD.get_or_init(|| {
         let textures = Collection::spread(OLD, 8);
         assert!(!textures.contains(&NEW) && textures.contains(&OLD));
@@ -46,7 +46,7 @@ fn under(texture: u8, trial: u64) -> Unknown {
 /// A board that was given the world's table.
 fn told(elf: &Path, unknown: &Unknown) -> Talk {
     let mut talk = boot(elf, unknown, None);
-    let Known { calibration, table } = &world().1;
+    let FirmwareData { calibration, table } = &world().1;
     talk.teach(calibration, table, |_, _| ()).unwrap();
     talk
 }

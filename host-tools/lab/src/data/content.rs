@@ -1,4 +1,4 @@
-//! What can be wrong with the contents of a file, and what to do about it. Who reads the file says where it is.
+//! Faults in the contents of a file, and their remedies. The reader of the file adds the place.
 
 use std::io;
 
@@ -6,8 +6,9 @@ use tactus_core::features::MovementError;
 use tactus_core::sensor::pressure::RATE_HZ;
 
 use crate::data::recordings::npy::{MAX_SAMPLES, NpyError};
+use crate::data::recordings::own::VERSION;
 
-/// What is wrong with the contents of a file, and what to do. The errors that hold it say which file, and where in it.
+/// A fault in the contents of a file, and its remedy. The errors that hold it name the file, and the place in it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContentError {
@@ -23,7 +24,7 @@ pub enum ContentError {
 
     // tables
     /// No text.
-    #[error("not UTF-8 text; this is no such table")]
+    #[error("not UTF-8 text, so this is not a table in CSV")]
     NotUtf8,
     /// The CSV reader complains.
     #[error("{0}")]
@@ -42,7 +43,7 @@ pub enum ContentError {
         "{0} fields where the header has {1}: cut off or damaged; fetch or write the file again"
     )]
     Fields(usize, usize),
-    /// A field is not what it should be.
+    /// A field has the wrong form.
     #[error("{0:?} is not {1}")]
     NotA(String, &'static str),
     /// A number is not finite.
@@ -74,6 +75,12 @@ pub enum ContentError {
     Count(u16),
 
     // recorded slides
+    /// They are of another version of the format.
+    #[error(
+        "version {0}, and this program reads version {VERSION}: write the recordings anew, or use the program \
+         that wrote them"
+    )]
+    Version(u32),
     /// Start and end of the steady part, s.
     #[error("the steady window {0} s to {1} s is not a stretch of time")]
     Window(f32, f32),
@@ -128,11 +135,11 @@ pub enum ContentError {
     // files of samples
     /// The file was changed.
     #[error(
-        "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record it \
-         again"
+        "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record \
+         it again"
     )]
     Hash {
-        /// What was hashed.
+        /// The contents that were hashed.
         what: &'static str,
         /// Its hash.
         found: Box<str>,
@@ -142,7 +149,7 @@ pub enum ContentError {
     /// The file does not unpack.
     #[error("no whole gzip stream ({0}); fetch it again")]
     Gzip(io::Error),
-    /// The file unpacks to other than the manifest says: bytes found (of too many, one more than wanted) and wanted.
+    /// The file does not unpack to the manifest's length: bytes found (of too many, one more than wanted) and wanted.
     #[error(
         "unpacks to {0} {more}bytes{odd}; the manifest says {1}",
         more = if .0 > .1 { "or more " } else { "" },
@@ -196,7 +203,7 @@ pub enum ContentError {
     LongPacked(u64, u64),
 
     // the publisher's files
-    /// Time does not go on.
+    /// Time does not advance.
     #[error("not after the row before; fetch the file again")]
     NotAfter,
     /// Time goes back.
@@ -213,8 +220,9 @@ pub enum ContentError {
     NoForce,
     /// The name of a file of the Cluster dataset.
     #[error(
-        "the name is not SURFACE_DIRECTION_SPEED_FORCE_REPETITION.csv of the Cluster Haptic Texture Dataset (0_135_40_500_0.csv: \
-         multiples of 45 degrees, 20 to 60 mm/s, 500 or 1000 mN, 0 or 1); correct it or move the file away"
+        "the name is not SURFACE_DIRECTION_SPEED_FORCE_REPETITION.csv of the Cluster Haptic Texture Dataset \
+         (0_135_40_500_0.csv: multiples of 45 degrees, 20 to 60 mm/s, 500 or 1000 mN, 0 or 1); correct it or move the \
+         file away"
     )]
     ClusterName,
     /// A surface that is not in the dataset, and the last one that is.
@@ -222,13 +230,14 @@ pub enum ContentError {
     Surface(u32, u32),
     /// Speed along the way, and that of the file's name, mm/s.
     #[error(
-        "the finger moves at {0:.1} mm/s where the file's name says {1}: it was cut off or has a wrong name; fetch it again"
+        "the finger moves at {0:.1} mm/s where the file's name says {1}: it was cut off or has a wrong name; fetch it \
+         again"
     )]
     Speed(f64, u32),
     /// The force ends too early.
     #[error("ends before the finger has come to the end of its way; fetch it again")]
     NoForceThen,
-    /// A slide that came of a publisher's file is not usable.
+    /// A slide from a publisher's file is not usable.
     #[error("{0}; fetch the file again, or move it and its _cw away")]
     Imported(Box<Self>),
 
@@ -239,7 +248,7 @@ pub enum ContentError {
     /// Two files of a fabric.
     #[error("a second file of the fabric {0:?}; give each fabric one file and one name")]
     SecondFile(String),
-    /// How many slides are listed, and may be at most.
+    /// Number of slides in the list, and the largest number.
     #[error("the slides listed are {0}, and 1 to {1} can be: add some, or split the file")]
     SlideCount(usize, usize),
     /// A third repetition.
@@ -247,8 +256,8 @@ pub enum ContentError {
     Repetition(u8),
     /// Rows of a recording, its first value, and the most values of a file.
     #[error(
-        "the rows, {0} of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} values; correct \
-         the manifest"
+        "the rows, {0} of 16 values from value {1} on: a recording has 1 row at least, and a file no more than {2} \
+         values; correct the manifest"
     )]
     Span(u64, u64, u64),
     /// A recording comes twice.
@@ -263,10 +272,10 @@ pub enum ContentError {
         /// As in the manifest.
         repetition: u8,
     },
-    /// Where a recording begins, and where the one before ends.
+    /// Begin of a recording, and end of the one before.
     #[error(
-        "offset_values is {0}, but the recording before it ends at {1}; recordings follow each other without gap or overlap: \
-         correct the manifest"
+        "offset_values is {0}, but the recording before it ends at {1}; recordings follow each other without gap or \
+         overlap: correct the manifest"
     )]
     Gap(u64, u64),
     /// A set-point and speed that are no movement.
@@ -285,13 +294,14 @@ pub enum ContentError {
     Ends,
     /// Samples of a slide, and the least there must be.
     #[error(
-        "a slide of {0} samples is too short, {1} are the least; record it again or take this movement out of the manifest"
+        "a slide of {0} samples is too short, {1} are the least; record it again or take this movement out of the \
+         manifest"
     )]
     Short(usize, usize),
     /// No taxel moves.
     #[error(
-        "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of the \
-         manifest"
+        "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement out of \
+         the manifest"
     )]
     Silent,
 }

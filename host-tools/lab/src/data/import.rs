@@ -1,21 +1,21 @@
-//! Import of recordings into the project's own format: from any folder that [`RecordingSet`] opens, and from the CSV files of
-//! the BioTac's publisher.
+//! Import of recordings into the project's own format: from any folder that [`RecordingSet`] opens, and from the CSV
+//! files of the BioTac's publisher.
 //!
 //! # The publisher's files
 //! <https://github.com/dexrob/BioTac_slide_20_50> (Gao et al., IROS 2020) has `raw_data/matX/matX_N_bio.csv` and
 //! `matX_N_cw.csv` for slide N over material X; `_cp`, `_cv`, `_jp`, `_jt`, `_jv` and `.pt` are not wanted here.
 //!
-//! - `_bio`: `timestamp,tdc,tac,pdc,pac1..pac22,ele1..ele19`, one row about every 10 ms with the 22 samples of P_AC since the
-//!   row before; each row ends in a comma too many. P_DC and P_AC are |raw - baseline|, in counts.
-//! - `_cw`: `timestamp,fx,fy,fz,tx,ty,tz`, the wrench at the arm's hand in N and Nm, in bursts of about 150 Hz; the arm slides
-//!   along z, so that `fz` is the tangential force.
+//! - `_bio`: `timestamp,tdc,tac,pdc,pac1..pac22,ele1..ele19`, one row about every 10 ms with the 22 samples of P_AC
+//!   since the row before; each row ends in a comma too many. P_DC and P_AC are |raw - baseline|, in counts.
+//! - `_cw`: `timestamp,fx,fy,fz,tx,ty,tz`, the wrench at the arm's hand in N and Nm, in bursts of about 150 Hz; the arm
+//!   slides along z, so that `fz` is the tangential force.
 //!
-//! What is made of them: `pac` row by row, `pdc` as it is, `shear` = `fz` at the times of the rows of `_bio`, interpolated, in
-//! mN. `data/biotac` was made in this way, and keeps the first 590 of some 600 rows: this was checked by hand on rows of its
-//! slide 10 over material 1.
+//! The result of the import: `pac` row by row, `pdc` unchanged, `shear` = `fz` at the times of the rows of `_bio`,
+//! interpolated, in mN. `data/biotac` was made in this way, and keeps the first 590 of some 600 rows: this was checked
+//! by hand on rows of its slide 10 over material 1.
 //!
-//! **The signs of P_AC are not in the files; they are rebuilt** ([`signs`]): magnitudes are exact, power is exact, spectra are
-//! good, zero crossings and the sign of the whole are not known. The sign of P_DC is not rebuilt.
+//! **The signs of P_AC are not in the files; they are rebuilt** ([`signs`]): magnitudes are exact, power is exact,
+//! spectra are good, zero crossings and the sign of the whole are not known. The sign of P_DC is not rebuilt.
 //!
 //! The files name neither material nor force nor a still record: textures are called `matX`, and movement, window and
 //! background are those of `data/biotac`.
@@ -43,7 +43,7 @@ const ROW_RATE_HZ: u32 = 100;
 /// Longest slide that is imported, in rows: a minute. The publisher's last six seconds.
 const MAX_ROWS: usize = 6000;
 
-/// What was imported.
+/// Counts of an import.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Imported {
     /// Number of textures.
@@ -54,8 +54,8 @@ pub struct Imported {
     pub lost_rows: usize,
 }
 
-/// Converts the recordings in the folder `from` to the project's own format in the folder `to`, where an import that was
-/// interrupted goes on. `progress` is called with the number of slides done, and of slides in all.
+/// Converts the recordings in the folder `from` to the project's own format in the folder `to`; an interrupted import
+/// continues. `progress` is called with the number of slides done, and of slides in all.
 ///
 /// # Errors
 /// If there are no recordings in `from`, a file is damaged, or `to` already holds recordings or cannot be written.
@@ -134,8 +134,8 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
     Ok(done)
 }
 
-/// The slide numbers of each `matX` below `raw`. A slide of which only one file is there is listed too, so that reading it
-/// names the missing one.
+/// The slide numbers of each `matX` below `raw`. A slide of which only one file is there is listed too, so that reading
+/// it names the missing one.
 fn materials(raw: &Path) -> Result<BTreeMap<u32, BTreeSet<u32>>> {
     let mut materials = BTreeMap::new();
     for folder in names(raw)? {
@@ -176,7 +176,7 @@ fn names(folder: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// A writer that goes on with an import of this folder.
+/// A writer that continues an import of this folder.
 fn begin(command: &str, from: &Path, to: &Path, textures: Vec<Texture>) -> Result<RecordingWriter> {
     let from = fs::canonicalize(from).unwrap_or_else(|_| from.to_owned());
     let command = format!("tactus {command} {} ...", from.display());
@@ -301,7 +301,8 @@ fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
     Ok(force)
 }
 
-/// The force at `times`, in mN: on a straight line between its neighbours, before the first and after the last as these.
+/// The force at `times`, in mN: on a straight line between its neighbours, before the first and after the last as
+/// these.
 fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i16>, ContentError> {
     let span = |of: Option<f64>, to: Option<f64>| of.zip(to);
     let measured = span(force.first().map(|f| f.0), force.last().map(|f| f.0));

@@ -1,8 +1,8 @@
-//! Which program makes something that takes long: what it left unfinished is only gone on with by the same.
+//! The program that makes something that takes long: only the same program continues an unfinished one.
 
 use std::time::UNIX_EPOCH;
 
-/// Version of this program, and when it was built.
+/// Version of this program, and its build time.
 pub fn program() -> String {
     let modified = || {
         std::env::current_exe()

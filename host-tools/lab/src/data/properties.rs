@@ -1,9 +1,9 @@
-//! Tables of measured properties: the input of `tactus evaluate --properties`, and what the paper's own study worked on.
+//! Tables of measured properties: the input of `tactus evaluate --properties`, and of the paper's own study.
 //!
 //! A CSV table with the columns `texture,movement,trial,set,traction,roughness,fineness` in any order. `texture` and
-//! `movement` are names or numbers; `trial` is a number, once per texture, movement and set; `set` is `train` or `validate`.
-//! Every texture has training trials of every movement, as many as there happen to be. Textures may do without validation
-//! trials; one that has them has some of every movement.
+//! `movement` are names or numbers; `trial` is a number, once per texture, movement and set; `set` is `train` or
+//! `validate`. Every texture has training trials of every movement, as many as there happen to be. Textures may do
+//! without validation trials; one that has them has some of every movement.
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ pub struct PropertyTable {
     pub validate: Vec<Vec<Vec<Properties>>>,
 }
 
-/// Why a table of properties cannot be used.
+/// Reasons why a table of properties cannot be used.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
 pub enum PropertyError {
@@ -45,8 +45,8 @@ pub enum PropertyError {
     Row(#[from] RowError),
     /// A texture lacks trials of a movement.
     #[error(
-        "{}: texture {}, movement {}: no {set} trials, where texture {}, movement {} has {there}; give some, or leave out the \
-         movement or the texture",
+        "{}: texture {}, movement {}: no {set} trials, where texture {}, movement {} has {there}; give some, or leave \
+         out the movement or the texture",
         path.display(), at[0], at[1], like[0], like[1]
     )]
     Missing {
@@ -58,7 +58,7 @@ pub enum PropertyError {
         at: Box<[String; 2]>,
         /// A texture and movement that have trials.
         like: Box<[String; 2]>,
-        /// How many these are.
+        /// Number of these.
         there: usize,
     },
     /// A set has no trials at all.

@@ -1,8 +1,8 @@
 //! Slides of a real finger in the project's format, from the raw samples that the probe streams while it explores.
 //!
-//! The probe is asked for an exploration that takes one movement after the other and is never sure. P_AC and shear are the
-//! very samples that went into its features, and so is P_DC of a handheld. A rig does not stream P_DC: it is computed back
-//! from the contact force, which the rig reports 20 times a second.
+//! The probe gets a request for an exploration that takes one movement after the other and is never sure. P_AC and
+//! shear are the very samples of its features, and so is P_DC of a handheld. A rig does not stream P_DC: it is computed
+//! back from the contact force, which the rig reports 20 times a second.
 
 use crate::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_core::explorer::Strategy;
@@ -10,10 +10,10 @@ use tactus_core::features::{Block, Movement};
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::{Event, Identify, Live, Phase, Report};
 
-/// How often the probe reports the force while the rig moves.
+/// Rate at which the probe reports the force while the rig moves, Hz.
 const LIVE_HZ: u32 = 20;
 
-/// Why a slide that counted is not recorded.
+/// Reasons why a slide that counted is not recorded.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
@@ -34,7 +34,7 @@ pub struct Recorder {
     slide: Begun,
 }
 
-/// What has come of a slide.
+/// The data of a slide so far.
 #[derive(Debug, Default)]
 struct Begun {
     blocks: Vec<Block>,
@@ -42,16 +42,15 @@ struct Begun {
     began_ms: Option<u32>,
     sliding: bool,
     forces: Vec<(u32, i16)>,
-    /// P_DC from the slide's begin on, counts about that of the lifted finger, where the probe says it
+    /// P_DC from the slide's begin on, counts about that of the lifted finger, if the probe sends it
     pdc: Vec<i16>,
-    /// how fast it was, where the probe says it
-    pace: Option<i16>,
     /// it ended before its end
     early: bool,
 }
 
 impl Recorder {
-    /// The exploration of a trial, counted from 0, that makes the slides to record: with this threshold it does not end before.
+    /// The exploration of a trial, counted from 0, that makes the slides to record: with this threshold it does not end
+    /// before.
     pub fn wanted(trial: usize, slides: u8, seed: u32) -> Identify {
         Identify {
             threshold: 1.0,
@@ -74,8 +73,8 @@ impl Recorder {
         }
     }
 
-    /// Takes in a report; the slide that counts from now on, for the texture of this index. One that ended early is no recording of
-    /// its movement.
+    /// Takes in a report; the slide that counts from now on, for the texture of this index. One that ended early is no
+    /// recording of its movement.
     ///
     /// # Errors
     /// See [`RecordError`].
@@ -98,7 +97,7 @@ impl Recorder {
             Event::Live(Live { force_mn, .. }) if slide.sliding => {
                 slide.forces.push((report.at_ms, *force_mn));
             }
-            // a force reported while the finger is lifted is none of the slide's
+            // a force reported while the finger is lifted does not belong to the slide
             Event::Phase(_) if slide.began_ms.is_some() => slide.sliding = false,
             Event::Block(block) => {
                 if block.number == 0 {
@@ -109,21 +108,25 @@ impl Recorder {
                 slide.blocks.push(block.clone());
             }
             Event::Pdc(counts) => slide.pdc.extend_from_slice(counts),
-            Event::Pace(pace) => slide.pace = Some(*pace),
             Event::Early(_) => slide.early = true,
-            Event::SlideReport { .. } => {
+            Event::SlideReport { observed, .. } => {
                 let slide = std::mem::take(slide);
                 if slide.early {
                     return None;
                 }
-                return Some(self.finish(texture, slide));
+                return Some(self.finish(texture, slide, observed.pace));
             }
             _ => {}
         }
         None
     }
 
-    fn finish(&mut self, texture: usize, slide: Begun) -> Result<Recording, RecordError> {
+    fn finish(
+        &mut self,
+        texture: usize,
+        slide: Begun,
+        pace: Option<i16>,
+    ) -> Result<Recording, RecordError> {
         let mut numbered = slide.blocks.iter().enumerate();
         if let Some((missing, _)) = numbered.find(|(n, block)| usize::from(block.number) != *n) {
             return Err(RecordError::MissingBlock(missing as u16));
@@ -150,7 +153,7 @@ impl Recorder {
         Ok(Recording {
             texture,
             number: self.numbers,
-            pace: slide.pace,
+            pace,
             ..recording
         })
     }

@@ -1,8 +1,6 @@
 //! One recorded slide: the movement that made it, its blocks of samples, and what no block has.
 
 use std::ops::Range;
-
-use tactus_core::dsp::Kernels;
 use tactus_core::features::{Block, Movement, Slide};
 use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::RATE_HZ;
@@ -37,7 +35,7 @@ pub struct Recording {
     /// Tangential force in mN before and after constant speed, positive against the motion; `None` if the rig could not
     /// measure it.
     pub outside_mn: Option<[Vec<i16>; 2]>,
-    /// How fast it was, where that was measured: see [`Observation::pace`](tactus_core::features::Observation::pace).
+    /// Speed of the slide, if measured: see [`Observation::pace`](tactus_core::features::Observation::pace).
     pub pace: Option<i16>,
     /// Rate of the tangential force in Hz, also where there is none.
     pub shear_rate_hz: u32,
@@ -52,38 +50,38 @@ pub struct Texture {
     pub name: String,
 }
 
-/// What is known of a slide before its samples are read.
+/// Facts of a slide that are known before its samples are read.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct SlideKey {
     /// As [`Recording::number`].
     pub number: u32,
     /// As [`Recording::movement`].
     pub movement: Movement,
-    /// Of what it was made, and by whom.
+    /// Labels of its sample, and its operator.
     pub labels: Labels,
 }
 
-/// What quality control asks of a slide besides its texture; empty where nobody said.
+/// Labels of a slide for quality control besides its texture; empty if unknown.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Labels {
     /// Batch or piece that the sample was taken from.
     pub lot: String,
-    /// Who made the slide.
+    /// Operator of the slide.
     pub operator: String,
     /// Anything else.
     pub note: String,
-    /// Whether the sample was moved or turned since the slide before.
+    /// True if the sample was moved or turned since the slide before.
     pub moved: Option<bool>,
-    /// The finger; a BioTac where nobody said.
+    /// The finger; a BioTac if unknown.
     pub finger: FingerCode,
-    /// Day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day, 0 if it was not, or is
-    /// not known.
+    /// Day on which that finger's force per count was measured, as 20261121; 1 if the day is unknown, 0 if it was not
+    /// measured or that is unknown.
     pub calibrated: u32,
 }
 
 impl Recording {
-    /// What came in blocks, with P_DC beside them, in a record of so many ms. Texture and number are left at 0. `None`: some
-    /// of the samples did not come.
+    /// A recording from blocks, with P_DC beside them, of so many ms. Texture and number are left at 0. `None`: samples
+    /// are missing.
     pub fn from_blocks(
         movement: Movement,
         blocks: Vec<Block>,
@@ -105,7 +103,7 @@ impl Recording {
             background: None,
             pdc,
             pdc_rate_hz,
-            // a rig says shear at constant speed only, a handheld none
+            // a rig sends shear at constant speed only, a handheld none
             outside_mn: (inside > 0).then(|| [vec![0; before], vec![0; after]]),
             pace: None,
             shear_rate_hz: SHEAR_HZ,
@@ -113,11 +111,11 @@ impl Recording {
         recording.check().is_ok().then_some(recording)
     }
 
-    /// Takes the samples of whole streams, from the start of the record, in place of those it has: `still` is P_AC of the
-    /// finger at rest, empty where its power is known.
+    /// Takes the samples of whole streams, from the start of the record, in place of those it has: `still` is P_AC of
+    /// the finger at rest, empty where its power is known.
     ///
     /// # Errors
-    /// What is wrong with the recording.
+    /// The fault of the recording.
     pub fn cut(
         mut self,
         still: &[i16],
@@ -140,7 +138,7 @@ impl Recording {
     }
 
     /// Gives all samples to the core, as a rig would.
-    pub fn play<K: Kernels>(&self, slide: &mut Slide<'_, K>) {
+    pub fn play(&self, slide: &mut Slide<'_>) {
         if let Some(power) = self.background {
             slide.set_background(power);
         }
@@ -199,7 +197,7 @@ impl Recording {
     /// Refuses a recording that cannot be used: every reader and writer asks.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Its fault.
     pub(crate) fn check(&self) -> Result<(), ContentError> {
         let (start, end) = self.window;
         if !(start.is_finite() && end.is_finite() && 0.0 <= start && start < end) {

@@ -4,8 +4,8 @@
 //! - `manifest.csv`: the project's own format, see [`own`];
 //! - `manifest.json`: the layout of `data/biotac`, see [`biotac`].
 //!
-//! Opening a folder reads its manifest only; the samples of one texture are read when they are asked for, and every file is
-//! checked against the SHA-256 that the manifest gives.
+//! Opening a folder reads its manifest only; the samples of one texture are read when they are asked for, and every
+//! file is checked against the SHA-256 that the manifest gives.
 pub mod biotac;
 pub mod files;
 pub mod npy;
@@ -97,8 +97,8 @@ impl RecordingSet {
         &self.textures
     }
 
-    /// The slides of texture number `index` of [`textures`](Self::textures) in the order of time; none if there is no such
-    /// texture.
+    /// The slides of texture number `index` of [`textures`](Self::textures) in the order of time; none if there is no
+    /// such texture.
     pub fn slides(&self, index: usize) -> &[SlideKey] {
         self.slides.get(index).map_or(&[], Vec::as_slice)
     }

@@ -3,7 +3,7 @@
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::dsp::{Kernels, Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
 use tactus_core::rig::Rig;
 
@@ -15,7 +15,7 @@ use crate::data::recordings::{RecordingError, RecordingSet};
 /// # Errors
 /// The slide has none: it is too short or silent.
 pub fn measure(plan: &Plan, recorded: &Recording) -> Result<Measurement, SlideError> {
-    let mut slide = Slide::<Plain>::new(plan, recorded.movement);
+    let mut slide = Slide::new(plan, recorded.movement);
     recorded.play(&mut slide);
     slide.finish()
 }
@@ -27,11 +27,11 @@ pub struct MeasuredSlide {
     pub number: u32,
     /// The movement that made it.
     pub movement: Movement,
-    /// What the core computed.
+    /// The core's measurement.
     pub measurement: Measurement,
 }
 
-/// Why a folder cannot be measured.
+/// Reasons why a folder cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// It cannot be read.
@@ -44,13 +44,13 @@ pub enum MeasureError {
         texture: String,
         /// Number of the slide.
         number: u32,
-        /// What is wrong with it.
+        /// Its fault.
         why: SlideError,
     },
 }
 
-/// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns the
-/// slides of each texture in the order of time.
+/// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns
+/// the slides of each texture in the order of time.
 ///
 /// # Errors
 /// The first file that cannot be read, or the first slide that has no properties.
@@ -67,14 +67,14 @@ pub fn measure_all(
     })
 }
 
-/// A recorded slide, and what its first part alone would have said.
+/// A recorded slide, and the features of its first part alone.
 #[derive(Clone, Debug)]
 pub struct CutSlide {
     /// The whole slide.
     pub whole: MeasuredSlide,
-    /// How long it is at constant speed, s.
+    /// Its length at constant speed, s.
     pub seconds: f32,
-    /// Its first part, for each length that was asked for; `None` where it does not last longer.
+    /// Its first part, for each requested length; `None` if it does not last longer.
     pub first: Vec<Option<Measurement>>,
 }
 
@@ -140,7 +140,6 @@ fn measure_each<T: Send>(
 pub struct Replay {
     /// Those that were not replayed yet.
     slides: Vec<Recording>,
-    last: Option<Recording>,
     /// The movements that were recorded.
     movements: Vec<Movement>,
     measures: PropertySet,
@@ -174,15 +173,9 @@ impl Replay {
                 .filter(|&p| traction || p != Property::Traction)
                 .collect(),
             slides,
-            last: None,
             movements,
             random,
         }
-    }
-
-    /// The slide that was replayed last.
-    pub fn last(&self) -> Option<&Recording> {
-        self.last.as_ref()
     }
 }
 
@@ -193,7 +186,7 @@ impl Rig for Replay {
         self.measures
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), ReplayError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), ReplayError> {
         let movement = slide.movement();
         let recorded = (0..).zip(&self.slides);
         let recorded: Vec<usize> = recorded
@@ -208,7 +201,7 @@ impl Rig for Replay {
             });
         }
         let drawn = recorded[self.random.random_range(0..recorded.len())];
-        self.last.insert(self.slides.remove(drawn)).play(slide);
+        self.slides.remove(drawn).play(slide);
         Ok(())
     }
 
@@ -237,7 +230,7 @@ mod tests {
         let mut rig = Replay::new(slides, ChaCha8Rng::seed_from_u64(1));
         let mut seen = Vec::new();
         let mut slide = |movement| {
-            let mut slide = Slide::<Plain>::new(&plan, movement);
+            let mut slide = Slide::new(&plan, movement);
             block_on(rig.perform(&mut slide))?;
             Ok(slide.finish().unwrap().properties)
         };

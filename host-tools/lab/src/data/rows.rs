@@ -9,7 +9,7 @@ use crate::data::content::ContentError;
 /// Largest table that is read, in bytes: a damaged file must not fill the memory with one endless line.
 pub const MAX_BYTES: u64 = 64 << 20;
 
-/// What is wrong with a table, and where.
+/// A fault in a table, and its place.
 #[derive(thiserror::Error, Debug)]
 #[error("{}:{line}: {}{cause}", path.display(), column.map(|c| format!("column {c}: ")).unwrap_or_default())]
 pub struct RowError {
@@ -19,7 +19,7 @@ pub struct RowError {
     pub line: u64,
     /// Column, by its name in the header, if the error is about one.
     pub column: Option<&'static str>,
-    /// What is wrong, and what to do.
+    /// The fault, and its remedy.
     pub cause: ContentError,
 }
 
@@ -104,8 +104,8 @@ impl Rows {
     /// The next row; empty lines are skipped.
     ///
     /// # Errors
-    /// If the file cannot be read, or the row has another number of fields than the header. One comma too many at the end
-    /// is let pass: the BioTac publisher's rows have it.
+    /// If the file cannot be read, or the row has another number of fields than the header. One comma too many at the
+    /// end is let pass: the BioTac publisher's rows have it.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, RowError> {
         let error = |line, cause| RowError {
             path: self.path.clone(),
@@ -155,7 +155,7 @@ impl<'a> Row<'a> {
         at.and_then(|&(_, i)| self.record.get(i)).unwrap_or("")
     }
 
-    /// The value in `column`; `what` it should be is named if it is not.
+    /// The value in `column`; the error names `what` it should be.
     ///
     /// # Errors
     /// If it is not.
@@ -208,7 +208,7 @@ fn header_error(path: &Path, cause: ContentError) -> RowError {
     }
 }
 
-/// What csv says, without the place, which is ours to say.
+/// The message of csv without the place, which the caller adds.
 fn cause_of(error: csv::Error) -> ContentError {
     match error.kind() {
         csv::ErrorKind::Io(_) => ContentError::Io(error.into()),

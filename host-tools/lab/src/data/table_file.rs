@@ -8,7 +8,7 @@ use tactus_core::table::{Table, TableError};
 /// Most bytes of a table that are read: more textures and movements than a table can have.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// Why a file is no table.
+/// Reasons why a file is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableFileError {
     /// It cannot be read.
@@ -16,7 +16,7 @@ pub enum TableFileError {
     None {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// A check of it fails.
@@ -27,7 +27,7 @@ pub enum TableFileError {
         /// Which one.
         source: TableError,
     },
-    /// It has more in it.
+    /// There are bytes after the table.
     #[error("{}: other bytes follow the table; the file is not what `tactus learn` wrote", .0.display())]
     Behind(PathBuf),
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Writes a file as `PATH.part` and gives it its name when it is whole; what had that name is replaced.
+/// Writes a file as `PATH.part` and gives it its name when it is whole; it replaces a file of that name.
 ///
 /// # Errors
 /// The system's.

@@ -1,10 +1,10 @@
-//! Which texture of a table feels most like another: how often one slide would be taken for the other's.
+//! The texture of a table that is most like another: the share of slides that would be taken for the other's.
 
 use serde::Serialize;
 use tactus_core::features::Movement;
 use tactus_core::table::{Action, Contents, Table, white};
 
-/// Slides that an exploration makes at most, unless it is told otherwise, and how sure it wants to be.
+/// Slides that an exploration makes at most by default, as the limit of the count.
 const SLIDES: f64 = 10.0;
 /// Quantile of the normal distribution at 99 %.
 const SURE: f64 = 2.326;
@@ -14,8 +14,9 @@ const SURE: f64 = 2.326;
 pub struct Alike {
     /// The other texture.
     pub texture: String,
-    /// Share of slides of the one that would be taken for the other's, were these two the only ones, at the movement that
-    /// tells them apart best. 0 where they never are, 0.5 where it is a guess; more where the other was learned from more slides.
+    /// Share of slides of the one that would be taken for the other's, were these two the only ones, at the movement
+    /// that tells them apart best. 0 where they never are, 0.5 where it is a guess; more where the other was learned
+    /// from more slides.
     pub taken_for: f64,
     /// Contact force of that movement.
     pub force_n: f32,
@@ -23,7 +24,7 @@ pub struct Alike {
     pub speed_mm_s: f32,
     /// Slides of that movement that leave less than 1 % to chance; `None` where it is more than ten.
     pub slides: Option<u8>,
-    /// Whether ten slides of that movement would leave more than 1 % to chance.
+    /// True if ten slides of that movement would leave more than 1 % to chance.
     pub feels_the_same: bool,
 }
 
@@ -34,7 +35,7 @@ pub fn nearest(table: Table<'_>, texture: u16) -> Option<Alike> {
     compared.max_by(|a, b| a.taken_for.total_cmp(&b.taken_for))
 }
 
-/// How slides of `texture` would be taken for another one's; `None` where no movement was learned of both.
+/// The confusion of `texture` with another one; `None` where no movement was learned of both.
 pub fn alike(table: Table<'_>, texture: u16, other: u16) -> Option<Alike> {
     let (movement, deviation) = compare(table, [texture, other])?;
     let movement: Movement = table.movement(movement)?;
@@ -63,11 +64,13 @@ struct Apart {
     preferred: f64,
 }
 
-/// The movement that tells two textures apart best, and the normal deviation below which slides would be taken for the other's.
+/// The movement that tells two textures apart best, and the normal deviation below which slides would be taken for the
+/// other's.
 ///
-/// A slide goes to the nearer mean, so that the share is Phi(-d/2) where the means are d apart. Means of few slides are further
-/// apart than the textures are, by chance: their difference over all movements and features is shrunk as James and Stein
-/// (1961) do it, and what is left of its error widens the slide's. Of two means as near, the one of more slides is preferred.
+/// A slide goes to the nearer mean, so that the share is Phi(-d/2) where the means are d apart. Means of few slides are
+/// further apart than the textures are, by chance: their difference over all movements and features is shrunk as James
+/// and Stein (1961) do it, and what is left of its error widens the slide's. Of two means as near, the one of more
+/// slides is preferred.
 fn compare(table: Table<'_>, textures: [u16; 2]) -> Option<(u8, f64)> {
     let movements = (0..).zip(table.movements());
     let apart: Vec<Apart> = movements

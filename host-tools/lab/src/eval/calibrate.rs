@@ -1,7 +1,7 @@
-//! The limits of a fused table, from the slides that it is learned from: how much each of them, left out and drifted, looks
-//! like none of the textures.
+//! The limits of a fused table, from the slides that it is learned from: the distance of each of them, left out and
+//! drifted, from all textures.
 //!
-//! A slide that was learned from lies nearer to its texture's mean than one of another day. What it would be without itself
+//! A slide that was learned from lies nearer to its texture's mean than one of another day. Its distance without itself
 //! follows from its distance alone, so nothing is learned twice; a draw of the expected drift comes on top.
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
@@ -16,7 +16,7 @@ const FEW: usize = tactus_core::table::MAX_TEXTURES;
 const MOST: usize = 2048;
 /// Draws for every training slide.
 const DRAWS: usize = 8;
-/// Most that a slide is thought to be farther off than it looks, squared.
+/// Largest correction of a slide's distance, squared.
 const FARTHEST: f64 = 5.0;
 /// Share of the scores in the tail.
 const TAIL: f64 = 0.1;
@@ -25,16 +25,16 @@ const PRIOR: (f64, f64, f64) = (10.0, -1.0 - 2.5 * std::f64::consts::LN_10, 2.5)
 /// Weight of the average over all movements, in slides, as in the whitening.
 const SHARED: f64 = 15.0;
 
-/// Slides of a texture at a movement as their whitened distance from its mean, drawn out to what they would be had the mean
-/// and the whitening not been learned from them.
+/// Slides of a texture at a movement as their whitened distance from its mean, corrected for the part that they have in
+/// the mean and in the whitening.
 struct Residuals {
     texture: usize,
     /// Per movement with two slides or more: its index, and the slides.
     movements: Vec<(usize, Vec<Vec<f64>>)>,
 }
 
-/// Limits of `table`, whose sections have any limits so far. `white` has its slides, whitened, per texture and movement;
-/// `drifts` the variances of the drift at every movement, if there is any.
+/// Limits of `table`, whose sections have any limits so far. `white` has its slides, whitened, per texture and
+/// movement; `drifts` the variances of the drift at every movement, if there is any.
 ///
 /// # Errors
 /// The table cannot be explored.
@@ -72,7 +72,7 @@ fn limits_of<const N: usize>(
     let weight = weight / (weight + PRIOR.0);
     let tails = |against, drifts: Option<&[Drifts]>| -> [Tail; EPISODES] {
         std::array::from_fn(|more| {
-            // the same draws whatever is calibrated besides
+            // the same draws for every set of textures
             let mut random = ChaCha8Rng::seed_from_u64(more as u64);
             let mut scores = Vec::new();
             for own in &residuals {
@@ -140,8 +140,8 @@ fn residuals(known: &[Vec<Whitened>], white: &[Vec<Vec<Vector>>]) -> Vec<Residua
     white.iter().enumerate().map(of).collect()
 }
 
-/// An episode of so many slides: with one movement of this slide, with more of any slides. Every movement that was made, its
-/// slides, and their mean.
+/// An episode of so many slides: with one movement of this slide, with more of any slides. Every movement that was
+/// made, its slides, and their mean.
 fn episode(
     own: &Residuals,
     known: &[Whitened],

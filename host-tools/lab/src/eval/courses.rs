@@ -1,27 +1,27 @@
-//! Virtual explorations whatever the threshold: what was believed after each slide, from which follows what a user would be
-//! told at any threshold.
+//! Virtual explorations without a threshold: the belief after each slide, from which the verdict at any threshold
+//! follows.
 
 use tactus_core::explorer::{Config, Told};
 
 use crate::eval::evaluate::{EvaluateError, evaluate_by, play_with};
 use crate::eval::experiment::Experiment;
 
-/// What an explorer holds for true after a slide.
+/// The belief of an explorer after a slide.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Belief {
     /// The most probable texture.
     pub texture: usize,
     /// Its posterior probability.
     pub probability: f32,
-    /// Whether that is rather none of those known: then no threshold makes the texture sure.
+    /// True if it is rather none of the known textures: then no threshold makes the texture sure.
     rather_new: bool,
-    /// Whether a user would be told so.
+    /// True if the verdict would be a new texture.
     is_new: bool,
-    /// Whether it is not as it was learned.
+    /// True if it differs from the texture as it was learned.
     is_changed: bool,
 }
 
-/// A run that no threshold ended: what was believed after each of its slides.
+/// A run without a threshold: the belief after each of its slides.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Course {
     /// The texture that was to be identified.
@@ -31,8 +31,8 @@ pub struct Course {
 }
 
 impl Course {
-    /// What the user is told at this threshold, the slides until then, and the most probable texture. The choice of
-    /// movements does not depend on the threshold, so the run at one is the beginning of the run at a higher one.
+    /// The verdict at this threshold, the slides until then, and the most probable texture. The choice of movements
+    /// does not depend on the threshold, so the run at one is the beginning of the run at a higher one.
     pub fn told(&self, threshold: f32) -> (Told, usize, usize) {
         let is_sure = |b: &Belief| b.probability > threshold && !b.rather_new && !b.is_changed;
         // that takes two slides: see `Explorer::verdict`
@@ -55,7 +55,7 @@ impl Course {
     }
 }
 
-/// Plays runs as [`evaluate`](super::evaluate::evaluate) does, but whatever the threshold: see [`Course::told`].
+/// Plays runs as [`evaluate`](super::evaluate::evaluate) does, but without a threshold: see [`Course::told`].
 ///
 /// # Errors
 /// See [`EvaluateError`].

@@ -1,4 +1,4 @@
-//! Thousands of virtual explorations, and what they add up to.
+//! Thousands of virtual explorations, and their sums.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use tactus_core::explorer::{
 };
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
-use tactus_core::table::{Action, MAX_MOVEMENTS, Table, TableError};
+use tactus_core::table::{Action, Table, TableError};
 
 use crate::eval::experiment::{Experiment, Run};
 use crate::eval::learn;
@@ -18,7 +18,7 @@ use crate::eval::learn;
 /// Most textures that a PC explores among.
 pub const MAX_TEXTURES: usize = 2048;
 
-/// How a run decides and moves on.
+/// The method of a run: its comparison and its choice of movements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[cfg_attr(feature = "arguments", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
@@ -42,7 +42,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// How the core's explorer compares.
+    /// The comparison of the core's explorer.
     pub fn method(self) -> explorer::Method {
         match self {
             Self::Fused | Self::FusedCycle | Self::FusedRandom => explorer::Method::Fused,
@@ -52,7 +52,7 @@ impl Method {
         }
     }
 
-    /// How the core's explorer chooses.
+    /// The choice of the core's explorer.
     pub fn strategy(self) -> Strategy {
         match self {
             Self::Fused | Self::StudentAll | Self::Student | Self::Paper => Strategy::Bayesian,
@@ -72,33 +72,31 @@ impl Method {
     }
 }
 
-/// How one run ended.
+/// The end of one run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Outcome {
     /// The texture that was to be identified.
     pub unknown: usize,
     /// The answer.
     pub identified: usize,
-    /// Whether the threshold was exceeded.
+    /// True if the threshold was exceeded.
     pub sure: bool,
-    /// What a user would have been told.
+    /// The verdict.
     pub told: Told,
     /// Slides made.
     pub slides: u8,
-    /// How many of them with each movement.
-    pub made: [u8; MAX_MOVEMENTS],
-    /// Whether it would have been called unknown, had that been an answer.
+    /// True if it would have been called unknown, had that been an answer.
     pub unknown_like: bool,
 }
 
 impl Outcome {
-    /// What the user was told, and whether the most probable texture is the right one.
+    /// The verdict, and true if the most probable texture is the right one.
     pub fn told(&self) -> (Told, bool) {
         (self.told, self.identified == self.unknown)
     }
 }
 
-/// Why an evaluation came to nothing.
+/// Reasons why an evaluation fails.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
     /// The table cannot be learned.
@@ -115,17 +113,17 @@ pub enum EvaluateError {
 /// Most memory for degrees of confusion that are kept, bytes.
 const MAX_KEPT: usize = 256 << 20;
 
-/// What all runs with the same table share.
+/// The data that all runs with the same table share.
 #[derive(Clone, Debug)]
 pub struct Shared<'b> {
     /// The explorer before its first slide.
     pub explorer: Box<Explorer<'b, MAX_TEXTURES>>,
-    /// Where they are asked for at every step, and there is memory for them.
+    /// Kept if they are needed at every step, and there is memory for them.
     pub confusions: Option<Confusions<Vec<Degrees>>>,
 }
 
 impl<'b> Shared<'b> {
-    /// Of an explorer that moves on so.
+    /// The data of an explorer with this strategy.
     pub fn new(explorer: Box<Explorer<'b, MAX_TEXTURES>>, strategy: Strategy) -> Self {
         let buffer = Confusions::<Vec<_>>::len_for(&explorer);
         let keep = strategy == Strategy::Bayesian && buffer <= MAX_KEPT / size_of::<Degrees>();
@@ -143,7 +141,7 @@ impl<'b> Shared<'b> {
     }
 }
 
-/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them where they are asked for.
+/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them at each use.
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
@@ -158,24 +156,11 @@ pub fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
-    run: Run<'_>,
-    each: impl FnMut(Action, &Explorer<'_, N>),
-) -> Outcome {
-    play_looking(explorer, confusions, strategy, run, |_, _, _, _| (), each)
-}
-
-/// As [`play_with`]; `look` gets every action with the number of its slide before that is observed.
-pub(super) fn play_looking<const N: usize>(
-    explorer: &mut Explorer<'_, N>,
-    confusions: Option<&Confusions<Vec<Degrees>>>,
-    strategy: Strategy,
     mut run: Run<'_>,
-    mut look: impl FnMut(&mut Explorer<'_, N>, &Run<'_>, Action, usize),
     mut each: impl FnMut(Action, &Explorer<'_, N>),
 ) -> Outcome {
     explorer.restart();
     let mut failed = 0;
-    let mut made = [0; MAX_MOVEMENTS];
     let verdict = loop {
         if let Some(verdict) = explorer.verdict() {
             break verdict;
@@ -191,9 +176,9 @@ pub(super) fn play_looking<const N: usize>(
             _ => Default::default(),
         };
         let action = explorer.choose(&expected, run.random.next_u32());
-        let movement = action.movement.into();
-        let Some(n) = run.draw(movement) else {
-            // as the core explores on a rig: once more, then another movement, and then it ends with what is known
+        let Some(slide) = run.slide(action.movement.into()) else {
+            // as the core explores on a rig: once more, then another movement, and then it ends with the present
+            // posterior
             failed += 1;
             if !explorer.reject(action) || failed == MAX_REJECTED {
                 break explorer.best();
@@ -201,10 +186,8 @@ pub(super) fn play_looking<const N: usize>(
             continue;
         };
         failed = 0;
-        made[usize::from(action.movement)] += 1;
-        look(explorer, &run, action, n);
         explorer
-            .observe(action, run.shown(movement, n))
+            .observe(action, slide)
             .expect("every slide has the properties that the explorer was told of");
         each(action, explorer);
     };
@@ -214,13 +197,12 @@ pub(super) fn play_looking<const N: usize>(
         sure: verdict.sure,
         told: verdict.told(),
         slides: explorer.slides(),
-        made,
         unknown_like: explorer.is_unknown(),
     }
 }
 
 /// Plays `runs` runs on all cores; `done` is called after each. The outcomes are in the order of the runs, and the same
-/// whatever the number of threads.
+/// for any number of threads.
 ///
 /// # Errors
 /// See [`EvaluateError`].
@@ -248,18 +230,6 @@ pub(super) fn evaluate_by<T: Send>(
     play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
 ) -> Result<Vec<T>, EvaluateError> {
     let learn = |run| experiment.run(run).learn(config.method);
-    evaluate_from(experiment, config, runs, done, learn, play)
-}
-
-/// As [`evaluate_by`], with tables that `learn` makes from the training slides of a run.
-pub(super) fn evaluate_from<T: Send>(
-    experiment: &Experiment,
-    config: Config,
-    runs: u64,
-    done: impl Fn() + Sync,
-    learn: impl Fn(u64) -> Result<Vec<u8>, learn::TableError> + Sync,
-    play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
-) -> Result<Vec<T>, EvaluateError> {
     let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, kept: Kept<'_>, index| {
         let outcome = play(explorer, kept, experiment.run(index));
         done();
@@ -477,7 +447,6 @@ mod tests {
             sure,
             told: if sure { Told::Sure } else { Told::Undecided },
             slides,
-            made: [0; MAX_MOVEMENTS],
             unknown_like: slides == 4,
         };
         let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];

@@ -1,4 +1,4 @@
-//! Figures of virtual explorations, with and without what a user would have been told: what `tactus evaluate` prints.
+//! Figures of virtual explorations, with and without their verdicts: the output of `tactus evaluate`.
 
 use serde::Serialize;
 use tactus_core::explorer::Config;
@@ -6,17 +6,17 @@ use tactus_core::explorer::Config;
 use crate::eval::courses::courses;
 use crate::eval::evaluate::{EvaluateError, Method, Outcome, Summary, evaluate};
 use crate::eval::experiment::Experiment;
-use crate::eval::reliability::{AtThreshold, Statements, by_threshold, statements};
+use crate::eval::reliability::{Statements, statements};
 use crate::eval::verdicts::Verdicts;
 
 pub use crate::eval::courses::Course;
 
-/// The figures, and what they are of.
+/// The figures, and their conditions.
 #[derive(Serialize)]
 pub struct Evaluation {
-    /// How the runs decide.
+    /// Method of the runs.
     pub method: Method,
-    /// Which slides are learned from and tested on.
+    /// Division into slides to learn from and to test on.
     pub protocol: &'static str,
     /// Slides learned from, per texture and movement.
     pub train_slides: usize,
@@ -28,59 +28,57 @@ pub struct Evaluation {
     pub threshold: f32,
     /// Most slides of a run.
     pub max_slides: u8,
-    /// Of all draws.
+    /// Seed of all draws.
     pub seed: u64,
-    /// What users would have been told: the texture may be none of those known, and no slide counts twice.
+    /// Shares of the verdicts: the texture may be unknown, and no slide counts twice.
     pub verdicts: Verdicts,
     /// Mean number of slides until then.
     pub mean_slides_told: f64,
-    /// How often it was right when it said so, by what it said.
+    /// Reliability of the probabilities: share of right names by the stated probability.
     pub reliability: Vec<Statements>,
-    /// What another threshold would change.
-    pub by_threshold: Vec<AtThreshold>,
-    /// Figures of explorations that know that the texture is one of the table's, with slides drawn with replacement: the
+    /// Figures of explorations whose texture is one of the table's for certain, with slides drawn with replacement: the
     /// paper's protocol.
     #[serde(flatten)]
     pub summary: Summary,
 }
 
-/// What is to be evaluated.
+/// Settings of an evaluation.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked {
-    /// How the runs decide.
+pub struct EvaluationRequest {
+    /// Method of the runs.
     pub method: Method,
     /// The protocol's name.
     pub protocol: &'static str,
-    /// How many runs.
+    /// Number of runs.
     pub runs: u64,
     /// The experiment's seed.
     pub seed: u64,
-    /// How runs end, and choose.
+    /// Ends and choices of the runs.
     pub config: Config,
-    /// Whether reliability and other thresholds are wanted: a third of the work.
+    /// True if reliability is wanted: a third of the work.
     pub with_courses: bool,
 }
 
 /// A part of the work: it calls the function that it gets after every run.
 pub type Stage<'s> = dyn FnMut(&(dyn Fn() + Sync)) -> Result<(), EvaluateError> + 's;
 
-/// Plays the explorations. `stage` gets the number of each stage, how many there are, and its work, which it has to do. Gives the
-/// courses behind [`Evaluation::reliability`], too.
+/// Plays the explorations. `stage` gets the number of each stage, how many there are, and its work, which it has to do.
+/// Gives the courses behind [`Evaluation::reliability`], too.
 ///
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluation(
     experiment: Experiment,
-    asked: &Asked,
+    request: &EvaluationRequest,
     mut stage: impl FnMut([u32; 2], &mut Stage<'_>) -> Result<(), EvaluateError>,
 ) -> Result<(Evaluation, Vec<Course>), EvaluateError> {
-    let Asked {
+    let EvaluationRequest {
         config,
         runs,
         method,
         ..
-    } = *asked;
-    let stages = if asked.with_courses { 3 } else { 2 };
+    } = *request;
+    let stages = if request.with_courses { 3 } else { 2 };
     let mut outcomes = Vec::new();
     stage([1, stages], &mut |done| {
         outcomes = evaluate(&experiment, config, runs, done)?;
@@ -94,7 +92,7 @@ pub fn evaluation(
         Ok(())
     })?;
     let mut all = Vec::new();
-    if asked.with_courses {
+    if request.with_courses {
         stage([3, stages], &mut |done| {
             all = courses(&experiment, config, runs, done)?;
             Ok(())
@@ -103,15 +101,14 @@ pub fn evaluation(
     let names = experiment.names();
     let evaluation = Evaluation {
         reliability: statements(&all, config.threshold),
-        by_threshold: by_threshold(&all, config.threshold),
         method,
-        protocol: asked.protocol,
+        protocol: request.protocol,
         train_slides: experiment.train_slides(),
         runs,
         textures: names.len(),
         threshold: config.threshold,
         max_slides: config.max_slides,
-        seed: asked.seed,
+        seed: request.seed,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
         mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
         summary,

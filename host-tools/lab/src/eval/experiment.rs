@@ -1,9 +1,9 @@
-//! What every quoted figure means: which slides a table is learned from, and which the unknown texture shows.
+//! The experiment behind every quoted figure: slides to learn a table from, and slides of the unknown texture.
 //!
-//! A run is one virtual exploration: one texture is unknown, in turn, and each slide that an explorer asks for is drawn from
-//! that texture's test slides: with replacement, as in the reference program, or each once, as `identify` has it. Runs go in
-//! rounds, in which every texture is the unknown one once. The training slides of a round are drawn anew, and its runs share
-//! the table: learning one takes a hundred times as long as a run.
+//! A run is one virtual exploration: one texture is unknown, in turn, and each slide that an explorer asks for is drawn
+//! from that texture's test slides: with replacement, as in the reference program, or each once, as `identify` has it.
+//! Runs go in rounds, in which every texture is the unknown one once. The training slides of a round are drawn anew,
+//! and its runs share the table: learning one takes a hundred times as long as a run.
 
 use std::collections::{HashMap, HashSet};
 
@@ -28,17 +28,17 @@ pub use protocol::Protocol;
 const BLOCKED_TRAINING: usize = 19;
 /// Slides of a session in data/biotac.
 const SESSION: usize = 34;
-/// Where a second folder brings the test slides, blocked trains on slide numbers below this ...
+/// Limit of the slide numbers that blocked trains on, where a second folder brings the test slides ...
 const BLOCKED_BELOW: u32 = 30;
-/// ... and tests on numbers above this.
+/// ... and of those it tests on: they are above this.
 const BLOCKED_ABOVE: u32 = 34;
 
 /// Slides of one texture and movement.
 #[derive(Clone, PartialEq, Debug, Default)]
 struct Pool {
-    /// What training slides are drawn from, in the order of time.
+    /// Slides from which training slides are drawn, in the order of time.
     train: Vec<Observation>,
-    /// What the unknown texture shows; without it, what training has left over.
+    /// Slides of the unknown texture; without them, the rest after training.
     test: Option<Vec<Observation>>,
 }
 
@@ -60,9 +60,9 @@ pub struct Experiment {
     /// All training slides are used, as many as there happen to be; not with drawn ones.
     all: bool,
     measured: PropertySet,
-    /// What the fused method learns from; the best there is, unless given.
+    /// Features of the fused method; the best there are, unless given.
     features: Option<FeatureSet>,
-    /// And what else it expects.
+    /// Its other expectations.
     expected: Expected,
     /// No run shows a test slide twice.
     once: bool,
@@ -188,8 +188,8 @@ impl Experiment {
     }
 
     /// Slides that were cut into properties elsewhere: per texture and movement, those to train from and those to test
-    /// with. Textures without test slides are never the unknown one. Without `train_slides`, all training slides are used, not
-    /// necessarily equally many, else the first so many.
+    /// with. Textures without test slides are never the unknown one. Without `train_slides`, all training slides are
+    /// used, not necessarily equally many, else the first so many.
     ///
     /// The movements have no force and speed; they stand in the table as the first cells of the grid.
     ///
@@ -220,9 +220,9 @@ impl Experiment {
         )
     }
 
-    /// Slides that were divided when they were collected: per texture and movement, those to train from, of which all or the
-    /// first `train_slides` are used, and those to test with. Textures without test slides are never the unknown one. A table holds
-    /// [`table::MAX_MOVEMENTS`] movements.
+    /// Slides that were divided when they were collected: per texture and movement, those to train from, of which all
+    /// or the first `train_slides` are used, and those to test with. Textures without test slides are never the unknown
+    /// one. A table holds [`table::MAX_MOVEMENTS`] movements.
     ///
     /// # Errors
     /// See [`ExperimentError`].
@@ -311,8 +311,8 @@ impl Experiment {
         Self { features, ..self }
     }
 
-    /// The same, and no run shows a slide twice: as with [`crate::data::replay::Replay`], a movement without a slide left
-    /// is not made.
+    /// The same, and no run shows a slide twice: as with [`crate::data::replay::Replay`], a movement without a slide
+    /// left is not made.
     #[must_use]
     pub fn each_slide_once(self) -> Self {
         Self { once: true, ..self }
@@ -365,7 +365,7 @@ impl Experiment {
         self.train_slides
     }
 
-    /// Whether every run learns from the same slides.
+    /// Returns true if every run learns from the same slides.
     pub fn is_fixed(&self) -> bool {
         !self.drawn
     }
@@ -385,8 +385,8 @@ impl Experiment {
         }
     }
 
-    /// As [`Experiment::run`], with training slides of its own: for those who learn a table for each run anyway. Runs are
-    /// independent then.
+    /// As [`Experiment::run`], with training slides of its own: for callers that learn a table for each run anyway.
+    /// Runs are independent then.
     pub fn run_alone(&self, run: u64) -> Run<'_> {
         let mut alone = self.begin(run);
         alone.orders = self.orders(&mut alone.random);
@@ -412,8 +412,8 @@ impl Experiment {
 
     /// In which order slides are taken, by movement and how many there are.
     fn orders(&self, random: &mut ChaCha8Rng) -> HashMap<(usize, usize), Vec<usize>> {
-        // As in the reference program, the same places in the session are drawn for all textures: slides of one place share
-        // what the session did to them.
+        // As in the reference program, the same places in the session are drawn for all textures: slides of one place
+        // share what the session did to them.
         let mut orders: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
         if self.drawn {
             for (movement, pool) in self.pools.iter().flat_map(|pools| pools.iter().enumerate()) {
@@ -460,7 +460,7 @@ impl<'e> Run<'e> {
             .collect()
     }
 
-    /// Where the `n`th slide of a pool is: the training slides come first, then those to test with.
+    /// Place of the `n`th slide of a pool: the training slides come first, then those to test with.
     fn place(&self, movement: usize, pool: &Pool, n: usize) -> usize {
         let order = self.orders.get(&(movement, pool.train.len()));
         order.map_or(n, |order| order[n])
@@ -505,26 +505,12 @@ impl<'e> Run<'e> {
     /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.
     pub fn slide(&mut self, movement: usize) -> Option<&'e Observation> {
         let n = self.draw(movement)?;
-        Some(self.shown(movement, n))
-    }
-
-    /// The slide of the unknown texture of which the number was drawn.
-    pub(super) fn shown(&self, movement: usize, n: usize) -> &'e Observation {
-        self.drawn(self.experiment, movement, n)
-    }
-
-    /// A slide of the unknown texture in an experiment with the same slides, by the number that was drawn.
-    pub(super) fn drawn<'o>(
-        &self,
-        of: &'o Experiment,
-        movement: usize,
-        n: usize,
-    ) -> &'o Observation {
+        let of = self.experiment;
         let pool = &of.pools[self.unknown][movement];
-        match &pool.test {
+        Some(match &pool.test {
             Some(test) => &test[n],
             None => &pool.train[self.place(movement, pool, of.train_slides + n)],
-        }
+        })
     }
 
     /// The number of one more slide.

@@ -1,4 +1,4 @@
-//! A table from the first slides of a folder of recordings: what `tactus learn` does.
+//! A table from the first slides of a folder of recordings: the work of `tactus learn`.
 
 use tactus_core::features::{FeatureSet, Movement, Observation};
 use tactus_core::table::EncodeError;
@@ -10,15 +10,15 @@ use crate::eval::learn::{Expected, TableError, learn_for, name_finger};
 use crate::eval::samples::{note, of_all};
 use crate::eval::show::count;
 
-/// Why a folder makes no table.
+/// Reasons why a folder makes no table.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstError {
     /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
+    #[error("--train-slides {0}: the spread of a texture's slides takes at least two slides")]
     One(usize),
     /// As [`Self::One`], of one texture and movement.
     #[error(
-        "{texture}, {movement}: {}, and how slides of one texture differ takes at least two", count(*there as u64, "slide")
+        "{texture}, {movement}: {}; the spread of a texture's slides takes at least two", count(*there as u64, "slide")
     )]
     Few {
         /// Name of the texture.
@@ -31,7 +31,7 @@ pub enum FirstError {
     /// The slides make no table.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// What the recordings say of samples and finger cannot be noted.
+    /// The recordings' notes of samples and finger do not fit into a table.
     #[error(transparent)]
     Encode(#[from] EncodeError),
     /// The slides cannot be compared.
@@ -39,7 +39,7 @@ pub enum FirstError {
     Recording(#[from] RecordingError),
 }
 
-/// That slides to learn from are enough.
+/// Checks that there are enough slides to learn from.
 ///
 /// # Errors
 /// [`FirstError::One`].
@@ -98,7 +98,7 @@ pub fn learn_first(
         &movements,
         &first,
     )?;
-    // what the recordings say of the very slides that were learned from
+    // the recordings' notes of the slides that were learned from
     let moved = |texture: usize| {
         let keys = set.slides(texture);
         let of = |movement: &Movement| {

@@ -1,22 +1,23 @@
-//! How repeatable a probe and its operators are: the variance of a property by part, by operator and by repetition (crossed
-//! random effects, analysis of variance; Automotive Industry Action Group, Measurement Systems Analysis, 4th edition).
+//! Repeatability of a probe and its operators: the variance of a property by part, by operator and by repetition
+//! (crossed random effects, analysis of variance; Automotive Industry Action Group, Measurement Systems Analysis, 4th
+//! edition).
 
 use serde::Serialize;
 
 /// One measured value.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reading {
-    /// What was touched.
+    /// The part that was touched.
     pub part: String,
-    /// Who touched it; empty where nobody said.
+    /// The operator; empty if unknown.
     pub operator: String,
     /// Number of the slide, in the order of time.
     pub slide: u32,
-    /// What was measured.
+    /// The value.
     pub value: f64,
 }
 
-/// Standard deviations of what a value is made of, in its unit.
+/// Standard deviations of the components of a value, in its unit.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Deviations {
     /// One operator on one part, again and again.
@@ -25,7 +26,7 @@ pub struct Deviations {
     pub operator: Option<f64>,
     /// Between operators, of one part more than of another; as [`operator`](Self::operator).
     pub operator_by_part: Option<f64>,
-    /// Repeatability and operators together: what is the measurement's.
+    /// Repeatability and operators together: the measurement's part.
     pub gauge: f64,
     /// Between parts.
     pub part: f64,
@@ -33,27 +34,28 @@ pub struct Deviations {
     pub total: f64,
 }
 
-/// What readings of one property come to.
+/// The analysis of the readings of one property.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Study {
     /// Mean of the parts' means.
     pub mean: f64,
-    /// What they differ by.
+    /// Their components.
     pub sd: Deviations,
     /// Share of [`Deviations::gauge`] in [`Deviations::total`]; 0 where nothing differs.
     pub gauge_share: f64,
-    /// Classes of parts that can be told apart, 1.41 times part by gauge; `None`: the gauge is exact.
+    /// Classes of parts that the gauge separates, 1.41 times part by gauge; `None`: the gauge is exact.
     pub distinct_categories: Option<u32>,
-    /// How far a reading may be from the mean of its part and operator: three standard deviations, by the mean moving range.
+    /// Largest distance of a reading from the mean of its part and operator: three standard deviations, by the mean
+    /// moving range.
     pub control_limit: f64,
     /// Readings that are further away, as numbers of [`Study::away`].
     pub outside: Vec<usize>,
-    /// How far each reading is from the mean of its part and operator, in the order of the readings.
+    /// Distance of each reading from the mean of its part and operator, in the order of the readings.
     #[serde(skip)]
     pub away: Vec<f64>,
 }
 
-/// Why readings come to nothing.
+/// Reasons why readings make no study.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum GaugeError {
     /// Nothing to compare.
@@ -63,14 +65,14 @@ pub enum GaugeError {
     OnePart,
     /// Nothing was repeated.
     #[error(
-        "no part has two slides by one operator; what repetition changes takes two at least: record with --slides 3"
+        "no part has two slides by one operator; repeatability takes at least two: record with --slides 3"
     )]
     NoRepetition,
 }
 
 /// Mean moving range of two normal values in standard deviations, 2/sqrt(pi).
 const RANGE_IN_SD: f64 = std::f64::consts::FRAC_2_SQRT_PI;
-/// sqrt(2): half-widths of a class that holds 97 % of what one part reads.
+/// sqrt(2): half-widths of a class that holds 97 % of the readings of one part.
 const CLASS: f64 = std::f64::consts::SQRT_2;
 
 /// Each of these once, in the order in which they come.
@@ -88,8 +90,8 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Splits what the readings differ by. Where numbers of repetitions differ, cells count alike, each as their harmonic mean
-/// (unweighted means). An interaction that is no larger than repetition says it is counts as repetition.
+/// Splits the differences of the readings. Where numbers of repetitions differ, cells count alike, each as their
+/// harmonic mean (unweighted means). An interaction that is no larger than repetition explains counts as repetition.
 ///
 /// # Errors
 /// See [`GaugeError`].

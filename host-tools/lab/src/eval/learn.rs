@@ -14,13 +14,13 @@ use tactus_core::table::{
 use super::calibrate::limits;
 use super::pace;
 
-/// Why slides do not make a table.
+/// Reasons why slides do not make a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// The table cannot be written.
     #[error("the table cannot be written")]
     Encode(#[from] EncodeError),
-    /// The slides do not show how slides of one texture differ.
+    /// The slides do not show the differences of slides of one texture.
     #[error(
         "the features cannot be whitened; learn from more slides, or with --features of a smaller set"
     )]
@@ -91,10 +91,10 @@ pub fn learn(
     learn_for(&usual, method, features, names, movements, slides)
 }
 
-/// What a fused table is to expect.
+/// Expectations of a fused table.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Expected {
-    /// How fingers and samples change; `None` for a table as version 3 had it, without limits.
+    /// Change of fingers and samples; `None` for a table without drift and limits, which decides by its means alone.
     pub drift: Option<Drift>,
     /// Share of known textures that may be taken for new ones.
     pub false_alarm: f32,
@@ -130,11 +130,12 @@ pub fn name_finger(
     Ok(named)
 }
 
-/// A table with what shorter slides say, the shortest first: their length in ms, a table learned from the first parts of the same
-/// slides, and a bit for each movement whose slides are longer. Without any, the table without what it has of them.
+/// A table with the statistics of shorter slides, the shortest first: their length in ms, a table learned from the
+/// first parts of the same slides, and a bit for each movement whose slides are longer. Without any, the table without
+/// those statistics.
 ///
 /// # Errors
-/// A table is none, or not of the same textures and movements.
+/// A table is invalid, or not of the same textures and movements.
 pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let shorter = shorter.iter().map(|(ms, table, movements)| {
@@ -152,17 +153,17 @@ pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec
     Ok(out)
 }
 
-/// What a slide of a trial says, and what its first part alone would have said.
+/// Features of a slide of a trial, and those of its first part alone.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ObservedTrial {
     /// The whole slide.
     pub whole: Observation,
-    /// Its first part, for each length that was asked for; `None` where it does not last longer.
+    /// Its first part, for each requested length; `None` if it does not last longer.
     pub first: Vec<Option<Observation>>,
 }
 
-/// As [`learn_for`], with what slides say after each of these lengths, in ms at constant speed, the shortest first: those that each
-/// trial was observed at.
+/// As [`learn_for`], with features after each of these lengths, in ms at constant speed, the shortest first: those that
+/// each trial was observed at.
 ///
 /// # Errors
 /// See [`TableError`].
@@ -190,7 +191,7 @@ pub fn learn_lengths(
             cells.all(|trial| first(trial).is_some())
         };
         let longer = (0..movements.len()).filter(|movement| is_longer(*movement));
-        // where it does not last longer the whole one stands for it, and says nothing
+        // where it does not last longer the whole one takes its place, without any statistics
         let table = learn(&|trial| first(trial).unwrap_or_else(|| trial.whole.clone()))?;
         Ok((ms, table, longer.map(|movement| 1 << movement).sum()))
     });
@@ -198,7 +199,7 @@ pub fn learn_lengths(
     Ok(know_lengths(&whole, &shorter)?)
 }
 
-/// As [`learn`], for what else is expected.
+/// As [`learn`], with these expectations.
 ///
 /// # Errors
 /// See [`TableError`].
@@ -288,7 +289,7 @@ fn learn_fused(
                 })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    // a table without sections has no space for slopes
+    // a table without sections has no field for slopes
     let lines = expected
         .drift
         .and_then(|_| pace::lines(slides, &vectors, features));

@@ -1,5 +1,5 @@
-//! A session in the order of time: the probe learns a table from a few slides, then every later slide is an episode of its
-//! own, and the probe continues to learn.
+//! A session in the order of time: the probe learns a table from a few slides, then every later slide is an episode of
+//! its own, and the probe continues to learn.
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -14,20 +14,20 @@ use crate::eval::evaluate::{EvaluateError, explorer};
 use crate::eval::experiment::Experiment;
 use crate::eval::verdicts::Verdicts;
 
-/// From whom the probe learns during the session.
+/// The teacher of the probe during the session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Learning {
-    /// From nobody.
+    /// Nobody.
     None,
-    /// From its own certain verdicts.
+    /// Its own certain verdicts.
     Itself,
-    /// From these, and from the user where it is not certain.
+    /// These, and the user where it is not certain.
     Asking,
 }
 
 impl Learning {
-    /// What the probe does, for people.
+    /// The probe's rule, for people.
     pub fn words(self) -> &'static str {
         match self {
             Self::None => "learning nothing",
@@ -37,14 +37,14 @@ impl Learning {
     }
 }
 
-/// What a session comes to.
+/// The result of a session.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Lifelong {
-    /// From whom the probe learned.
+    /// The teacher of the probe.
     pub learning: Learning,
     /// Episodes of one slide.
     pub episodes: usize,
-    /// Right first guesses, before anybody was asked.
+    /// Share of right first guesses, before a label.
     pub accuracy: f64,
     /// Those of the texture that fared worst, and its name.
     pub worst: (f64, String),
@@ -52,7 +52,7 @@ pub struct Lifelong {
     pub uncertain: f64,
     /// Share of wrong labels among those that the probe gave itself.
     pub wrong_updates: f64,
-    /// What the user would have been told after each episode's slide.
+    /// Verdicts after each episode's slide.
     pub verdicts: Verdicts,
     /// The session, slide by slide.
     pub over_time: Vec<Moment>,
@@ -67,14 +67,14 @@ pub struct Moment {
     pub slide: usize,
     /// Episodes of it.
     pub episodes: usize,
-    /// How far the slides are from what the table says of their textures then: root mean square over features and episodes,
-    /// in standard deviations between slides of one texture.
+    /// Distance of the slides from the table's means of their textures then: root mean square over features and
+    /// episodes, in standard deviations between slides of one texture.
     pub distance_sd: f64,
-    /// What the user would have been told.
+    /// Shares of the verdicts.
     pub verdicts: Verdicts,
 }
 
-/// How far the slides of a texture are from what the table says of it, slide by slide.
+/// Distance of the slides of a texture from the table's mean of it, slide by slide.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TextureCourse {
     /// Its name.
@@ -83,7 +83,7 @@ pub struct TextureCourse {
     pub distance_sd: Vec<f64>,
 }
 
-/// One episode: what was presented, and what became of it.
+/// One episode: its texture, and its result.
 struct Episode {
     /// Place of the slide in its texture's session, from 0.
     time: usize,
@@ -91,7 +91,7 @@ struct Episode {
     right: bool,
     certain: bool,
     told: Told,
-    /// Mean square distance from what the table says of the texture, over features.
+    /// Mean square distance from the table's mean of the texture, over features.
     square: f64,
 }
 
@@ -169,7 +169,7 @@ fn play(
     Ok(episodes)
 }
 
-/// The first guess from one slide, whether it is certain, and what the user is told.
+/// The first guess from one slide, true if it is certain, and the verdict.
 fn look(
     experiment: &Experiment,
     config: Config,
@@ -202,7 +202,7 @@ fn whitened(table: &Table<'_>, movement: u8, slide: &Observation) -> Result<Vect
     Ok(table.whiten(movement, &vector).unwrap_or_default())
 }
 
-/// Mean square distance of a slide from what the table says of its texture, over features.
+/// Mean square distance of a slide from the table's mean of its texture, over features.
 fn square(
     bytes: &[u8],
     texture: usize,

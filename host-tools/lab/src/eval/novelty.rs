@@ -1,4 +1,5 @@
-//! Textures that the table does not have: how many are noticed, and how often one that it has is taken for one.
+//! Textures that the table does not have: the share that is noticed, and the share of known textures that are taken for
+//! unknown ones.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -17,27 +18,27 @@ use crate::eval::verdicts::Verdicts;
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
 
-/// What users would be told after so many slides, whatever was told before.
+/// Verdicts after so many slides, independent of earlier ones.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct After {
     /// Slides of the episode.
     pub slides: usize,
-    /// Of textures of the table.
+    /// Textures of the table.
     pub known: Verdicts,
-    /// Of textures that were left out of it.
+    /// Textures that were left out of it.
     pub unknown: OfUnknown,
 }
 
-/// Shares of what is told of a texture that the table does not have, 0 to 1; they add up to 1.
+/// Shares of the verdicts on a texture that the table does not have, 0 to 1; they add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct OfUnknown {
-    /// Told that it is none of the textures known: right.
+    /// Verdict: none of the known textures. Right.
     pub new: f64,
-    /// Told that it is like one of them, but not as that was learned: noticed, too.
+    /// Verdict: like one of them, but changed. Noticed, too.
     pub changed: f64,
-    /// Told to be one of them, as sure.
+    /// Verdict: one of them, as sure.
     pub wrong: f64,
-    /// Told "not sure".
+    /// Verdict: "not sure".
     pub undecided: f64,
 }
 
@@ -49,7 +50,7 @@ impl OfUnknown {
 }
 
 impl After {
-    /// What is told of textures that were left out, in the words of those that were not: `right` is 0.
+    /// Verdicts on textures that were left out, in the words of those that were not: `right` is 0.
     pub fn unknown(&self) -> Verdicts {
         let OfUnknown {
             new,
@@ -81,14 +82,14 @@ impl From<Verdicts> for OfUnknown {
     }
 }
 
-/// What leaving textures out comes to.
+/// The result of leaving textures out.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Novelty {
     /// After one slide, two, and so on.
     pub novelty: Vec<After>,
-    /// What users would have been told of the textures that were left out: `new` is right, and `right` is 0.
+    /// Verdicts on the textures that were left out: `new` is right, and `right` is 0.
     pub verdicts_new: Verdicts,
-    /// What they would have been told of textures that the table has.
+    /// Verdicts on textures that the table has.
     pub verdicts_known: Verdicts,
 }
 
@@ -105,7 +106,7 @@ pub fn leave_one_out(
     leave_out(experiment, config, 1, runs, done)
 }
 
-/// Which textures are left out of a table together.
+/// Groups of textures that are left out of a table together.
 struct Groups(Vec<Vec<usize>>);
 
 impl Groups {
@@ -214,14 +215,14 @@ pub fn leave_out(
     })
 }
 
-/// Where a texture is in a table without those that are left out; `None`: it is one of them.
+/// Index of a texture in a table without those that are left out; `None`: it is one of them.
 fn place(texture: usize, out: &[usize]) -> Option<usize> {
     let before = out.iter().filter(|other| **other < texture).count();
     (!out.contains(&texture)).then(|| texture - before)
 }
 
-/// Slides over the run's texture with a table without those that are left out: what is told after each, and whether the most
-/// probable texture is the right one.
+/// Slides over the run's texture with a table without those that are left out: the verdict after each, and true if the
+/// most probable texture is the right one.
 fn episode(
     experiment: &Experiment,
     config: Config,

@@ -1,9 +1,11 @@
-//! How features go with the speed of a slide: a line over ln(speed) for every texture, from slides whose speed was measured.
+//! Features as functions of the speed of a slide: a line over ln(speed) for every texture, from slides whose speed was
+//! measured.
 
 use tactus_core::features::{FEATURE_STEPS, MAX_FEATURES, Observation, Vector};
 use tactus_core::table::{Pace, Slope, Slopes, Whitening};
 
-/// Weight of the slope of all textures together in that of one, in slides: a few slides at about one speed say little of it.
+/// Weight of the slope of all textures together in that of one, in slides: a few slides at about one speed show little
+/// of it.
 const POOLED_SLIDES: f64 = 10.0;
 /// Least standard deviation of ln(speed) within a texture that slopes can be learned from: a rig holds its speed.
 const LEAST_SPREAD: f64 = 0.02;
@@ -28,8 +30,8 @@ pub(super) struct Lines {
     paces: Vec<Vec<Vec<Option<f64>>>>,
 }
 
-/// Learns them; `None` where the speed of no slide is known, or all are alike. A slide of unknown speed counts as one of the usual
-/// speed.
+/// Learns them; `None` where the speed of no slide is known, or all are alike. A slide of unknown speed counts as one
+/// of the usual speed.
 pub(super) fn lines(
     slides: &[Vec<Vec<Observation>>],
     vectors: &[Vec<Vec<Vector>>],

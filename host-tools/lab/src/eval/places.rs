@@ -1,12 +1,12 @@
-//! Places of a table's textures in a plane: how far they are apart, as well as a plane can show it.
+//! Places of a table's textures in a plane: their distances, as well as a plane can show them.
 
 use tactus_core::features::{Observation, Property};
 use tactus_core::table::{Action, Contents, Table, white};
 
 use super::show::apart;
 
-/// How far each two textures are apart, in standard deviations within a texture: at one movement, or root mean square over the
-/// movements at which both are known.
+/// Distance of each two textures, in standard deviations within a texture: at one movement, or root mean square over
+/// the movements at which both are known.
 pub fn distances(table: Table<'_>, at: Option<u8>) -> Vec<Vec<f64>> {
     let apart = |movement, textures: [u16; 2]| match table.contents() {
         Contents::Fused(..) => apart(table, movement, textures).map(f64::from),
@@ -31,8 +31,8 @@ pub fn distances(table: Table<'_>, at: Option<u8>) -> Vec<Vec<f64>> {
     all
 }
 
-/// How far a slide of a movement is from each texture of a fused table, in standard deviations within a texture; `None` if it lacks
-/// features.
+/// Distance of a slide of a movement from each texture of a fused table, in standard deviations within a texture;
+/// `None` if it lacks features.
 pub fn slide_distances(table: Table<'_>, movement: u8, slide: &Observation) -> Option<Vec<f64>> {
     let all = |one: &dyn Fn(u16) -> f64| (0..table.textures()).map(one).collect();
     match table.contents() {
@@ -63,7 +63,7 @@ pub fn slide_distances(table: Table<'_>, movement: u8, slide: &Observation) -> O
     }
 }
 
-/// How far two textures are apart by the three properties, whose standard deviations each texture has its own of.
+/// Distance of two textures by the three properties, for which each texture has its own standard deviations.
 fn apart_by_properties(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f64> {
     let mut squares = None;
     for property in Property::ALL {
@@ -78,14 +78,15 @@ fn apart_by_properties(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Op
     squares.map(f64::sqrt)
 }
 
-/// Places in a plane whose distances are as near to these as a linear map makes them (classical scaling, Torgerson 1952).
+/// Places in a plane whose distances are as near to these as a linear map makes them (classical scaling, Torgerson
+/// 1952).
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Plane {
     /// A place for each.
     pub places: Vec<(f64, f64)>,
     /// Mean squared distance of each from all.
     means: Vec<f64>,
-    /// What a squared distance from each adds to each axis.
+    /// Contribution of a squared distance from each to each axis.
     axes: [Vec<f64>; 2],
 }
 
@@ -127,7 +128,7 @@ impl Plane {
         }
     }
 
-    /// Where another one lies that has these distances from all (Gower 1968).
+    /// Place of another one that has these distances from all (Gower 1968).
     pub fn place(&self, distances: &[f64]) -> (f64, f64) {
         let nearer = || {
             self.means
@@ -142,7 +143,7 @@ impl Plane {
         (x, y)
     }
 
-    /// The same plane, turned and turned over to where it is as near as can be to another one of the same.
+    /// The same plane, turned and mirrored to lie as near as possible to another one of the same.
     #[must_use]
     pub fn turned_to(mut self, other: &Self) -> Self {
         let pairs = || self.places.iter().zip(&other.places);
@@ -177,7 +178,7 @@ impl Plane {
     }
 }
 
-/// How far distances between places are off, as part of the distances (root mean square).
+/// Error of the distances between places, as part of the distances (root mean square).
 pub fn off(distances: &[Vec<f64>], places: &[(f64, f64)]) -> f64 {
     let (mut apart, mut all) = (0.0, 0.0);
     for (row, a) in distances.iter().zip(places) {
@@ -189,7 +190,7 @@ pub fn off(distances: &[Vec<f64>], places: &[(f64, f64)]) -> f64 {
     if all > 0.0 { (apart / all).sqrt() } else { 0.0 }
 }
 
-/// Rounds of the power method: the nearest of two axes is off by less than can be seen.
+/// Rounds of the power method: the error of the nearest of two axes is too small to be seen.
 const ROUNDS: usize = 300;
 
 /// The greatest eigenvalue of a symmetric matrix, at least 0, and its vector, by the power method.

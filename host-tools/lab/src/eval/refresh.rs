@@ -1,12 +1,12 @@
-//! A table after the skin or the finger was replaced: from a slide of each texture at each movement, or more, what was learned
-//! is moved to where the new finger feels it.
+//! A table after the skin or the finger was replaced: a slide or more of each texture at each movement moves the
+//! learned means to the new finger's.
 //!
-//! What all textures have in common (the new finger's gain, for one) moves the features that are whitened to 0; with them move
-//! all textures, those without a new slide too, and limits and drift stay what they are. What a texture has of its own moves
-//! its mean, along each axis by w = t^2 / (t^2 + 1/k + 1/n) of it: k new slides have the variance 1/k + 1/n about a mean of n
-//! anyway, and t^2 is by how much the textures' own shifts vary beyond that (empirical Bayes, by moments). The mean's error
-//! then has the variance (1 - w)^2 (1/n + t^2) + w^2/k; from so many slides as would leave as large a one the table says that
-//! the texture was learned.
+//! The shift that all textures have in common (the new finger's gain, for one) moves the features that are whitened to
+//! 0; with them move all textures, those without a new slide too, and limits and drift stay as they are. A texture's
+//! own shift moves its mean, along each axis by w = t^2 / (t^2 + 1/k + 1/n) of it: k new slides have the variance 1/k +
+//! 1/n about a mean of n anyway, and t^2 is the variance of the textures' own shifts beyond that (empirical Bayes, by
+//! moments). The mean's error then has the variance (1 - w)^2 (1/n + t^2) + w^2/k; the table notes as many slides for
+//! the texture as would leave an error as large.
 
 use serde::Serialize;
 use tactus_core::features::{Vector, WHITE_STEPS};
@@ -25,20 +25,20 @@ pub struct NewSlide {
     pub features: Vec<i16>,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Refreshed {
     /// The table.
     pub bytes: Vec<u8>,
-    /// How far all textures moved together: root mean square over movements and features, standard deviations of a slide.
+    /// Shift of all textures together: root mean square over movements and features, standard deviations of a slide.
     pub together: f64,
-    /// How far each texture moved beyond that, the farthest first; those that have a new slide.
+    /// Shift of each texture beyond that, the largest first; those that have a new slide.
     pub moved: Vec<Moved>,
-    /// Pairs that ten slides do not tell apart any more.
+    /// Pairs that ten slides do not separate any more.
     pub alike: Vec<Pair>,
 }
 
-/// How far a texture moved.
+/// Shift of a texture.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Moved {
     /// Its name.
@@ -47,24 +47,24 @@ pub struct Moved {
     pub moved: f64,
 }
 
-/// Two textures that cannot be told apart.
+/// Two textures that ten slides do not separate.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Pair {
     /// The one.
     pub first: String,
     /// The other.
     pub second: String,
-    /// Whether they could not be told apart before either.
+    /// True if ten slides did not separate them before either.
     pub before: bool,
 }
 
-/// Why a table was not refreshed.
+/// Reasons why a table was not refreshed.
 #[derive(Debug, thiserror::Error)]
 pub enum RefreshError {
     /// The table does not compare whitened features.
     #[error("only tables with whitened features can be refreshed: learn this one again")]
     NotFused,
-    /// There is nothing to go by.
+    /// There is no new slide.
     #[error("no slide of a texture of the table was made")]
     NoSlide,
     /// The new table cannot be written.
@@ -72,7 +72,7 @@ pub enum RefreshError {
     Encode(#[from] EncodeError),
 }
 
-/// Moves what the table has learned by new slides.
+/// Moves the learned means by new slides.
 ///
 /// # Errors
 /// See [`RefreshError`].
@@ -161,7 +161,7 @@ impl Mean {
     }
 }
 
-/// By how much the new slides of a texture differ from what was learned.
+/// Difference between a texture's new slides and its learned mean.
 struct Shift {
     texture: u16,
     /// Of their mean along each axis, standard deviations of a slide.
@@ -201,14 +201,14 @@ fn varies(shifts: &[Shift], common: &[f64]) -> Vec<f64> {
     let anyway: f64 = shifts.iter().map(|s| s.new + s.learned).sum();
     let of_axis = |(axis, common): (usize, &f64)| {
         let squares: f64 = shifts.iter().map(|s| (s.by[axis] - common).powi(2)).sum();
-        // of one texture nothing is known but what all have in common
+        // of a single texture only the common shift is known
         (squares / (count - 1.0).max(1.0) - anyway / count).max(0.0)
     };
     common.iter().enumerate().map(of_axis).collect()
 }
 
-/// The features that are to be whitened to 0 where all whitened features shift so much; `None` where the whitening cannot be
-/// turned round.
+/// The features that are to be whitened to 0 where all whitened features shift so much; `None` where the whitening
+/// cannot be turned round.
 fn centre(table: &Table<'_>, movement: u8, shift: &[f64]) -> Option<Vec<i16>> {
     let whitening = table.whitening(movement)?;
     let features = whitening.features();
@@ -264,7 +264,7 @@ fn solve(equations: &mut [Vec<f64>]) -> Option<Vec<f64>> {
     Some(x)
 }
 
-/// The pairs that ten slides do not tell apart in the new table, and whether they did in the old one.
+/// The pairs that ten slides do not separate in the new table, and whether they did in the old one.
 fn pairs(old: Table<'_>, new: Table<'_>) -> Vec<Pair> {
     let same = |table, a, b| alike(table, a, b).is_some_and(|alike| alike.feels_the_same);
     let name = |texture| new.name(texture).unwrap_or_default().to_owned();

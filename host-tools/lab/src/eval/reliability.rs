@@ -1,4 +1,4 @@
-//! How often explorations are right when they say so, and what another threshold would change.
+//! Reliability of stated probabilities.
 
 use serde::Serialize;
 
@@ -7,9 +7,6 @@ use super::verdicts::Verdicts;
 
 /// Lower ends of the probabilities that are counted together; the last has no upper one.
 const SAID: [f32; 7] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999];
-/// Thresholds that are compared, besides the one in use.
-const THRESHOLDS: [f32; 8] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999];
-
 /// Statements of about the same probability: the most probable texture after each slide, until the exploration ended.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Statements {
@@ -17,27 +14,16 @@ pub struct Statements {
     pub from: f32,
     /// Below this one; 1 is the last of the last.
     pub to: f32,
-    /// How many there were.
+    /// Their number.
     pub count: u64,
-    /// How many of them were right.
+    /// Number of right ones.
     pub right: u64,
-    /// Mean of the probabilities that were said; `None` where none was.
+    /// Mean of the stated probabilities; `None` if there are none.
     pub said: Option<f64>,
 }
 
-/// What explorations would come to at a threshold.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct AtThreshold {
-    /// Sure above this probability.
-    pub threshold: f32,
-    /// Mean number of slides until the answer.
-    pub mean_slides: f64,
-    /// What users would be told.
-    pub verdicts: Verdicts,
-}
-
-/// How often the most probable texture was the right one, by the probability that was said. Slides of one exploration are
-/// not independent.
+/// Share of right names by the stated probability of the most probable texture. Slides of one exploration are not
+/// independent.
 pub fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
     let upper = SAID.iter().skip(1).copied().chain([1.0]);
     let mut bins: Vec<(Statements, f64)> = SAID
@@ -71,25 +57,7 @@ pub fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
     bins.into_iter().map(mean).collect()
 }
 
-/// What explorations would come to at usual thresholds and at the one in use, from the lowest on.
-pub fn by_threshold(courses: &[Course], in_use: f32) -> Vec<AtThreshold> {
-    let mut thresholds = THRESHOLDS.to_vec();
-    if !thresholds.contains(&in_use) {
-        thresholds.push(in_use);
-        thresholds.sort_by(f32::total_cmp);
-    }
-    let at = |threshold| {
-        let slides = courses.iter().map(|course| course.told(threshold).1 as f64);
-        AtThreshold {
-            threshold,
-            mean_slides: slides.sum::<f64>() / courses.len().max(1) as f64,
-            verdicts: verdicts(courses, threshold),
-        }
-    };
-    thresholds.into_iter().map(at).collect()
-}
-
-/// What users would be told at this threshold.
+/// Shares of the verdicts at this threshold.
 pub fn verdicts(courses: &[Course], threshold: f32) -> Verdicts {
     Verdicts::of(courses.iter().map(|course| {
         let (told, _, texture) = course.told(threshold);

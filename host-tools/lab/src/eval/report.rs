@@ -1,4 +1,4 @@
-//! What a table is good for: how well its textures are told apart, what recorded slides make of it, and what would help.
+//! Quality of a table: the separation of its textures, the verdicts on recorded slides, and advice.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -17,27 +17,27 @@ use crate::eval::verdicts::Verdicts;
 
 /// Explorations for each texture of recordings.
 pub const RUNS: u64 = 25;
-/// A pair whose slides are taken for each other's less often is not worth a line.
+/// Share of confused slides below which a pair is not listed.
 const WORTH_SAYING: f64 = 0.01;
 /// Most pairs that are listed.
 const PAIRS: usize = 20;
-/// Recorded slides whose mean is so many standard deviations of the mean away say that a texture is not as it was learned.
+/// Distance of the recorded slides' mean, in standard deviations of the mean, from which a texture counts as changed.
 const MOVED: f64 = 3.0;
-/// A slide of a texture that scatters so much more than others do says less than the table believes.
+/// Scatter of a texture's slides relative to others' from which a slide is less informative than the table assumes.
 const WIDE: f64 = 1.5;
 
-/// A table, and what it is good for.
+/// A table, and its quality.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Report {
-    /// What stands in it.
+    /// Its contents.
     pub table: TableSummary,
     /// The textures, in the order of the table.
     pub textures: Vec<TextureReport>,
-    /// Textures that slides are taken for most often, most often first.
+    /// Pairs of textures by their confusion, the most frequent first.
     pub pairs: Vec<Pair>,
-    /// What recordings made of it, where there are some.
+    /// The verdicts on recordings, if there are any.
     pub recorded: Option<Recorded>,
-    /// What would help, in words.
+    /// Advice in words.
     pub advice: Vec<String>,
 }
 
@@ -48,32 +48,32 @@ pub struct TextureReport {
     pub name: String,
     /// Slides it was learned from at each movement, in the order of the movements.
     pub trials: Vec<u8>,
-    /// Whether its sample was moved or turned between them; `None`: nobody said.
+    /// True if its sample was moved or turned between them; `None` if unknown.
     pub sample_moved: Option<bool>,
     /// The texture that it is most like.
     pub nearest: Option<Alike>,
-    /// What recordings make of it.
+    /// The verdicts on recordings of it.
     pub recorded: Option<RecordedTexture>,
 }
 
 /// Two textures that are taken for each other.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Pair {
-    /// The texture that is touched ...
+    /// The touched texture ...
     pub texture: String,
-    /// ... and what it is taken for.
+    /// ... and the one it is taken for.
     #[serde(flatten)]
     pub other: Alike,
 }
 
-/// What recorded slides make of a table.
+/// The verdicts on recorded slides with a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Recorded {
     /// Explorations of textures that the table has.
     pub explorations: usize,
-    /// What a user would have been told of them.
+    /// Verdicts on them.
     pub known: Verdicts,
-    /// What of textures that the table does not have; `None`: the recordings have no others.
+    /// Verdicts on textures that the table does not have; `None`: the recordings have no others.
     pub unknown: Option<Verdicts>,
     /// Mean number of slides until then, of the known ones.
     pub mean_slides: f64,
@@ -81,21 +81,21 @@ pub struct Recorded {
     pub not_in_table: Vec<String>,
 }
 
-/// What recorded slides make of one texture.
+/// The verdicts on recorded slides of one texture.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RecordedTexture {
-    /// What a user would have been told.
+    /// Verdicts.
     pub verdicts: Verdicts,
     /// Mean number of slides until then.
     pub mean_slides: f64,
     /// Scatter of its slides, 1 where it is as in all textures together; of a table of whitened features.
     pub spread: Option<f64>,
-    /// How far their mean is from the table's, in standard deviations of that difference, root mean square over features and
-    /// movements: about 1 where nothing changed.
+    /// Distance of their mean from the table's, in standard deviations of that difference, root mean square over
+    /// features and movements: about 1 where nothing changed.
     pub moved: Option<f64>,
 }
 
-/// Why there is no report.
+/// Reasons why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The table cannot be explored.
@@ -113,7 +113,7 @@ pub enum ReportError {
 pub struct Slides {
     /// Its name.
     pub name: String,
-    /// Its slides, but those that the table was learned from.
+    /// Its slides, without those that the table was learned from.
     pub slides: Vec<MeasuredSlide>,
 }
 
@@ -273,7 +273,8 @@ fn pairs(table: Table<'_>) -> Vec<Pair> {
     pairs
 }
 
-/// Scatter of slides about their own mean, and how far that is from the table's. One slide a movement says nothing of scatter.
+/// Scatter of slides about their own mean, and distance of that from the table's. A single slide of a movement shows no
+/// scatter.
 fn scatter(table: Table<'_>, texture: u16, slides: &[Vec<Observation>]) -> Option<(f64, f64)> {
     let Contents::Fused(set, length) = table.contents() else {
         return None;
@@ -310,7 +311,7 @@ fn scatter(table: Table<'_>, texture: u16, slides: &[Vec<Observation>]) -> Optio
     (features > 0.0).then(|| ((within / freedoms).sqrt(), (away / features).sqrt()))
 }
 
-/// What would help whoever uses the table.
+/// Advice for the table's user.
 fn advice(report: &Report) -> Vec<String> {
     let mut advice = Vec::new();
     let mut told: Vec<(&str, &str)> = Vec::new();
@@ -323,8 +324,8 @@ fn advice(report: &Report) -> Vec<String> {
         let share = format!("{:.0} %", 100.0 * other.taken_for);
         match other.slides {
             None => advice.push(format!(
-                "{a} and {b} cannot be told apart with these movements: {share} of the slides of {a} would be taken for {b}, and \
-                 ten slides do not settle it. Give them one name, or learn them at another movement."
+                "{a} and {b} cannot be told apart with these movements: {share} of the slides of {a} would be taken \
+                 for {b}, and ten slides do not settle it. Give them one name, or learn them at another movement."
             )),
             Some(n @ 4..) => advice.push(format!(
                 "{a} and {b} take about {} to tell apart; more trials of both would help.",
@@ -360,20 +361,21 @@ fn advice(report: &Report) -> Vec<String> {
         };
         if let Some(moved) = recorded.moved.filter(|moved| *moved > MOVED) {
             advice.push(format!(
-                "{name} is not as it was learned: the mean of its recorded slides is off by {moved:.1} times what chance explains. \
-                 If finger or sample changed, learn it again."
+                "{name} is not as it was learned: the mean of its recorded slides is off by {moved:.1} times what \
+                 chance explains. If finger or sample changed, learn it again."
             ));
         }
         if let Some(spread) = recorded.spread.filter(|spread| *spread > WIDE) {
             advice.push(format!(
-                "Slides of {name} scatter {spread:.1} times as much as the table expects: it may differ from place to place. \
-                 Learn it from more places of the sample."
+                "Slides of {name} scatter {spread:.1} times as much as the table expects: it may differ from place to \
+                 place. Learn it from more places of the sample."
             ));
         }
     }
     if report.table.movements.len() == 1 && report.table.textures.len() > 1 {
         advice.push(
-            "The table has one movement, so there is nothing to choose: a second one, at another force and speed, tells more."
+            "The table has one movement, so there is nothing to choose: a second one, at another force and speed, \
+             tells more."
                 .to_owned(),
         );
     }

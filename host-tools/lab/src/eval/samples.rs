@@ -1,11 +1,11 @@
-//! What a table says of samples: whether they were moved or turned between the trials that it was learned from. A slide on the
-//! same track again says little about a texture.
+//! A table's notes of samples: true if they were moved or turned between the trials that it was learned from. A slide
+//! on the same track again shows little about a texture.
 
 use tactus_core::table::Table;
 
 pub use tactus_link::samples::{Noting, Trials, fewest, note, noting, of_all};
 
-/// What a table says of its samples, in words.
+/// The table's notes of its samples, in words.
 pub fn in_words(table: Table<'_>) -> String {
     let of = |wanted: Option<bool>| -> Vec<&str> {
         let textures = (0..table.textures()).filter(|&texture| table.moved(texture) == wanted);
@@ -31,12 +31,12 @@ pub fn in_words(table: Table<'_>) -> String {
     format!("samples, {}", parts.join("; "))
 }
 
-/// What would help where samples never moved; `None` where there are none.
+/// Advice for samples that never moved; `None` if there are none.
 pub fn advice(stayed: &[&str]) -> Option<String> {
     (!stayed.is_empty()).then(|| {
         format!(
-            "Learned at one spot: {}. A slide on the same track again says little about a texture, so it may not be known at \
-             other spots, or turned: learn it again, and move or turn the sample between trials.",
+            "Learned at one spot: {}. A slide on the same track again says little about a texture, so it may not be \
+             known at other spots, or turned: learn it again, and move or turn the sample between trials.",
             stayed.join(", ")
         )
     })

@@ -24,7 +24,7 @@ pub struct Show<'t, W> {
     table: Table<'t>,
     out: W,
     slides: u32,
-    /// What a person was asked to do last.
+    /// The last prompt to the person.
     prompt: Option<Prompt>,
     answered: Option<(Verdict, u8)>,
     /// The first failure to write, kept until the end.
@@ -32,7 +32,7 @@ pub struct Show<'t, W> {
 }
 
 impl<'t, W: Write> Show<'t, W> {
-    /// Shows what an explorer does with `table`.
+    /// Shows the explorer's steps with `table`.
     pub fn new(table: Table<'t>, out: W) -> Self {
         Self {
             table,
@@ -75,7 +75,7 @@ impl<'t, W: Write> Show<'t, W> {
         ))
     }
 
-    /// Shows what comes next, and why.
+    /// Shows the next action and its reason.
     ///
     /// # Errors
     /// A failure to write.
@@ -92,7 +92,7 @@ impl<'t, W: Write> Show<'t, W> {
         self.out.flush()
     }
 
-    /// Shows the features of a slide, and which textures are left after it.
+    /// Shows the features of a slide, and the textures that remain after it.
     ///
     /// # Errors
     /// A failure to write.
@@ -139,7 +139,7 @@ impl<'t, W: Write> Show<'t, W> {
         self.out.flush()
     }
 
-    /// Shows what a probe says of an exploration, up to its answer; anything else shows nothing.
+    /// Shows a probe's event of an exploration, up to its answer; shows nothing for any other.
     ///
     /// # Errors
     /// A failure to write.
@@ -153,15 +153,17 @@ impl<'t, W: Write> Show<'t, W> {
                 observed,
                 posterior,
                 ..
-            } => self.slide_report(
-                *action,
-                &observed.properties(),
-                observed.roughness_is_bound,
-                posterior,
-            ),
-            Event::Pace(pace) => {
-                let percent = 100.0 * (f64::from(*pace) / 1024.0).exp();
-                self.line(&format!("  speed: {percent:.0} % of the movement's"))
+            } => {
+                if let Some(pace) = observed.pace {
+                    let percent = 100.0 * (f64::from(pace) / 1024.0).exp();
+                    self.line(&format!("  speed: {percent:.0} % of the movement's"))?;
+                }
+                self.slide_report(
+                    *action,
+                    &observed.properties(),
+                    observed.roughness_is_bound,
+                    posterior,
+                )
             }
             Event::Early(ms) => self.early(*ms),
             Event::Rejected { why, .. } => self.line(&format!("  rejected: {why}")),
@@ -180,7 +182,7 @@ impl<'t, W: Write> Show<'t, W> {
         self.answered
     }
 
-    /// What an action looks at: "fineness", "all features".
+    /// The measured quantity of an action: "fineness", "all features".
     fn looked_at(&self, action: Action) -> &'static str {
         match (action.property, self.table.contents()) {
             (Some(property), _) => property.name(),
@@ -217,7 +219,7 @@ impl<'t, W: Write> Show<'t, W> {
             .iter()
             .take(2)
             .map(|o| {
-                // an action that would leave less was made before, and is worth less for that
+                // an action that would leave less was made before, and its benefit is lower for that
                 let worn = if o.uncertainty < chosen.uncertainty {
                     ", but it was made before"
                 } else {
@@ -303,7 +305,8 @@ impl<'t, W: Write> Show<'t, W> {
             }
             Told::Changed => writeln!(
                 self.out,
-                "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like it."
+                "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like \
+                 it."
             ),
             Told::Sure => writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}."),
             Told::Undecided => writeln!(
@@ -314,12 +317,12 @@ impl<'t, W: Write> Show<'t, W> {
     }
 }
 
-/// Whether a verdict is right about the texture of this name; `None` where it is undecided.
+/// Returns true if a verdict is right about the texture of this name; `None` if it is undecided.
 pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
     match verdict.told() {
         Told::Sure => Some(table.name(verdict.texture) == Some(truth)),
         Told::New => Some(table.find(truth).is_none()),
-        // of another texture it is no wrong answer: that is not as I learned this one
+        // for another texture it is no wrong answer: the verdict is that the texture is not as learned
         Told::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
         Told::Undecided => None,
     }
@@ -360,7 +363,7 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{features}: {}", set.name())?;
         let share = |share: f32| format!("{:.1} %", 100.0 * share);
         match table.drift() {
-            None => writeln!(out, "no drift and no limits: of an older version")?,
+            None => writeln!(out, "it has neither drift nor limits")?,
             Some(drift) if drift.is_none() => writeln!(out, "no drift is expected")?,
             Some(drift) => writeln!(
                 out,
@@ -412,7 +415,7 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Prints whether samples were moved between trials, and what would help where they never were.
+/// Prints whether samples were moved between trials, and advice if they never were.
 fn show_samples(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}", samples::in_words(table))?;
     let stayed = (0..table.textures()).filter(|&texture| table.moved(texture) == Some(false));
@@ -423,7 +426,7 @@ fn show_samples(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     }
 }
 
-/// Prints what a fused table holds: whitened means say nothing to people, how far they are apart does.
+/// Prints a fused table: whitened means are meaningless to people, distances between them are not.
 fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     for (movement, index) in table.movements().zip(0..) {
         writeln!(out, "\nmovement {}: {movement}", index + 1)?;
@@ -459,7 +462,7 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// How far the means of two textures are apart at a movement, in standard deviations within a texture.
+/// Distance of the means of two textures at a movement, in standard deviations within a texture.
 pub fn apart(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Option<f32> {
     if textures
         .iter()

@@ -1,4 +1,4 @@
-//! What a table holds, as one object for programs: the JSON of `tactus table show`.
+//! The contents of a table as one object for programs: the JSON of `tactus table show`.
 
 use serde::Serialize;
 use tactus_core::features::Property;
@@ -14,17 +14,18 @@ pub struct TableSummary {
     pub bytes: usize,
     /// CRC-32 of it, in hexadecimal digits.
     pub checksum: String,
-    /// What slides are compared by: the three properties, or a set of whitened features.
+    /// Basis of the comparison: the three properties, or a set of whitened features.
     pub features: &'static str,
     /// The finger that it was learned with.
     pub finger: FingerCode,
-    /// Day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day, 0 if it was not, or is not known.
+    /// Day on which that finger's force per count was measured, as 20261121; 1 if the day is unknown, 0 if it was not
+    /// measured or that is unknown.
     pub finger_calibrated: u32,
-    /// The drift that it expects; `null` in a table of properties or of an older version.
+    /// The drift that it expects; `null` in a table of properties.
     pub drift: Option<Drift>,
     /// The share of false alarms that its limits are for; `null` where it has none.
     pub false_alarm: Option<f32>,
-    /// Lengths at which it knows what a slide says before its end, s at constant speed.
+    /// Lengths of shorter slides that it has statistics of, s at constant speed.
     pub lengths_s: Vec<f64>,
     /// The movements.
     pub movements: Vec<MovementSummary>,
@@ -46,19 +47,19 @@ pub struct MovementSummary {
 pub struct TextureSummary {
     /// Its name.
     pub name: String,
-    /// Slides that the factory learned it from, that a user taught, and that the probe learned by itself.
+    /// Slides from which it was learned: from the factory, from a user, and by the probe itself.
     pub slides_factory: u32,
     /// See [`Self::slides_factory`].
     pub slides_user: u32,
     /// See [`Self::slides_factory`].
     pub slides_itself: u32,
-    /// Whether its sample was moved or turned between trials; `null` where nobody said.
+    /// True if its sample was moved or turned between trials; `null` if unknown.
     pub sample_moved: Option<bool>,
-    /// What is known of it at each movement, in the order of the movements.
+    /// Its statistics at each movement, in the order of the movements.
     pub movements: Vec<KnownSummary>,
 }
 
-/// What is known of a texture at a movement.
+/// The statistics of a texture at a movement.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct KnownSummary {
     /// Slides it was learned from.
@@ -71,7 +72,7 @@ pub struct KnownSummary {
     pub fineness_ln: Option<[f32; 2]>,
     /// The texture that is most like it here, in a table of whitened features.
     pub nearest: Option<String>,
-    /// How far the two are apart, in standard deviations within a texture.
+    /// Distance of the two, in standard deviations within a texture.
     pub nearest_sd: Option<f32>,
 }
 

@@ -19,7 +19,7 @@ pub struct Transcript {
     slides: Vec<SlideRecord>,
 }
 
-/// A slide: why it was made, what it measured, and what is known after it.
+/// A slide: the reason for it, its measurements, and the posterior after it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SlideRecord {
     /// Contact force of the movement.
@@ -34,14 +34,14 @@ pub struct SlideRecord {
     pub traction_n: Option<f32>,
     /// Roughness, a logarithm.
     pub roughness_ln: Option<f32>,
-    /// Whether the surface is at most as rough as that.
+    /// True if the surface is at most as rough as that.
     pub roughness_is_bound: bool,
     /// Fineness, a logarithm.
     pub fineness_ln: Option<f32>,
-    /// When it ended, seconds at constant speed, if that was before its end.
+    /// End of the slide, seconds at constant speed, if it ended early.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ended_after_s: Option<f64>,
-    /// Why the slide does not count, if it does not.
+    /// The reason why the slide does not count, if it does not.
     pub rejected: Option<String>,
     /// The textures after the slide, the most probable first.
     pub posterior: Vec<Candidate>,
@@ -56,7 +56,7 @@ pub struct Candidate {
     pub probability: f32,
 }
 
-/// What the user is told.
+/// The verdict.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Answer {
     /// `sure`, `changed`, `new` or `undecided`.
@@ -115,7 +115,7 @@ impl Transcript {
         }
     }
 
-    /// Takes what a probe with `table` says of an exploration; anything else is nothing of it.
+    /// Takes a probe's event of an exploration with `table`; ignores any other.
     pub fn event(&mut self, event: &Event, table: Table<'_>) {
         match event {
             Event::Chosen {

@@ -1,4 +1,4 @@
-//! What users would have been told at the end of explorations, and how often.
+//! The verdicts of explorations, and their shares.
 
 use serde::{Deserialize, Serialize};
 use tactus_core::explorer::Told;
@@ -6,23 +6,23 @@ use tactus_core::explorer::Told;
 /// Shares of explorations, 0 to 1; they add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Verdicts {
-    /// Told the right name as sure.
+    /// Verdict: the right name, as sure.
     pub right: f64,
-    /// Told the name of a texture that is not as it was learned. Only calibrated tables give this verdict.
+    /// Verdict: a texture that has changed since it was learned. Only calibrated tables give this verdict.
     pub changed: f64,
-    /// Of those that were told so, the share that was told the right name; `None` where nobody was. No part of the sum.
+    /// Share of right names among these; `None` if there were none. Not a part of the sum.
     #[serde(default)]
     pub changed_right: Option<f64>,
-    /// Told that it is none of the textures known.
+    /// Verdict: none of the known textures.
     pub new: f64,
-    /// Told a wrong name as sure.
+    /// Verdict: a wrong name, as sure.
     pub wrong: f64,
-    /// Told "not sure", whatever the most likely name.
+    /// Verdict: "not sure", with any name as the most likely one.
     pub undecided: f64,
 }
 
 impl Verdicts {
-    /// Counts what was told at the end of each exploration, and whether the most probable texture was the right one.
+    /// Counts the verdict of each exploration, with true if the most probable texture was the right one.
     pub fn of(told: impl IntoIterator<Item = (Told, bool)>) -> Self {
         let mut counts = Self::default();
         let (mut all, mut named) = (0.0_f64, 0.0_f64);

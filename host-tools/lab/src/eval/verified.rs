@@ -1,4 +1,4 @@
-//! Whether a sample is the same as a reference, as people and programs read it.
+//! The comparison of a sample with a reference, for people and programs.
 
 use std::io::{self, Write};
 
@@ -9,31 +9,32 @@ use tactus_core::wire::Failure;
 
 use super::show::{count, percent};
 
-/// What `verify --format json` prints.
+/// The output of `verify --format json`.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Verified {
-    /// The texture that it may be.
+    /// The texture to compare with.
     pub reference: String,
-    /// Where it is known what it is said to be.
+    /// The expected texture of the sample, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
     /// `same`, `different` or `unsure`.
     pub answer: &'static str,
     /// Fewest slides of the reference at a movement.
     pub reference_slides: u8,
-    /// Whether these are too few to rely on.
+    /// True if these are too few to rely on.
     pub few: bool,
-    /// Share of the reference's own visits that would be called different.
+    /// Share of the reference's own episodes that would be called different.
     pub false_alarm: f32,
-    /// How probable "the same" has to be.
+    /// Least probability of "the same".
     pub threshold: f32,
-    /// Share of other textures' visits of as many slides that would be called the same; `null`: the table has no other.
+    /// Share of other textures' episodes of as many slides that would be called the same; `null`: the table has no
+    /// other.
     pub false_accept: Option<f64>,
     /// One after the other.
     pub slides: Vec<Slide>,
 }
 
-/// The table cannot say what is the same.
+/// The table has no limits for a comparison.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error("{}", Failure::NoLimits)]
 pub struct NoLimits;
@@ -62,7 +63,7 @@ impl Verified {
     }
 }
 
-/// What was known after a slide.
+/// The state after a slide.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Slide {
     /// From 1.
@@ -71,7 +72,7 @@ pub struct Slide {
     pub force_n: f32,
     /// mm/s.
     pub speed_mm_s: f32,
-    /// How unlike the reference the slides are.
+    /// Difference of the slides from the reference.
     pub score: f32,
     /// Above it they are different.
     pub limit: f32,
@@ -88,7 +89,7 @@ pub fn name(answer: Answer) -> &'static str {
     }
 }
 
-/// Prints what was known after a slide.
+/// Prints the state after a slide.
 ///
 /// # Errors
 /// A failure to write.
@@ -105,7 +106,7 @@ pub fn print_slide(slide: &Slide, out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// Prints the answer, and what it is worth.
+/// Prints the answer, and its error rates.
 ///
 /// # Errors
 /// A failure to write.
@@ -113,11 +114,11 @@ pub fn print_answer(v: &Verified, out: &mut impl Write) -> io::Result<()> {
     let answer = match v.answer {
         "same" => format!("The same as {}.", v.reference),
         "different" => format!(
-            "Different from {}, or {0} changed beyond what is expected.",
+            "Different from {}, or {0} has changed more than expected.",
             v.reference
         ),
         _ => format!(
-            "Not sure yet whether it is {}: more slides would tell.",
+            "Not sure yet whether it is {}: more slides would decide.",
             v.reference
         ),
     };

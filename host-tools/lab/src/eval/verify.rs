@@ -1,5 +1,5 @@
-//! "The same as this one?": how often slides of a texture are taken for another one's, and the other way round, whatever the
-//! limit.
+//! "The same as this one?": the share of slides of a texture that are taken for another one's, and the other way round,
+//! for every limit.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -16,28 +16,28 @@ use crate::eval::learn;
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
-/// Other textures that each one is held against.
+/// Other textures that each one is compared with.
 const OTHERS: usize = 3;
 /// Points of a curve.
 const POINTS: usize = 60;
 
-/// What verifications come to.
+/// The result of verifications.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Verified {
     /// After one slide, two, three.
     pub verify: Vec<After>,
-    /// What is told of the reference's own slides, where they go on until it is told or they run out.
-    pub same: Told,
-    /// What is told of another texture's.
-    pub other: Told,
+    /// Answers for the reference's own slides, which end with an answer or with the last slide.
+    pub same: AnswerShares,
+    /// Answers for another texture's slides.
+    pub other: AnswerShares,
 }
 
-/// What is counted after so many slides.
+/// Shares after so many slides.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct After {
-    /// Slides of the visit.
+    /// Slides of the episode.
     pub slides: usize,
-    /// Where as large a share of the reference's own slides is rejected as of others' is accepted.
+    /// Error rate at the limit where the shares of false rejects and of false accepts are equal.
     pub equal_error: f64,
     /// Share of the reference's own that is called different.
     pub false_reject: f64,
@@ -49,7 +49,7 @@ pub struct After {
 
 /// Shares of answers, which add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Told {
+pub struct AnswerShares {
     /// "The same."
     pub same: f64,
     /// "Different."
@@ -60,8 +60,8 @@ pub struct Told {
     pub mean_slides: f64,
 }
 
-/// What slides of one visit say about one reference.
-struct Visit {
+/// The comparison of the slides of one episode with one reference.
+struct Episode {
     is_same: bool,
     scores: [f64; SLIDES],
     answers: [Answer; SLIDES],
@@ -69,15 +69,16 @@ struct Visit {
     end: (Answer, usize),
 }
 
-/// Why it was not evaluated.
+/// Reasons why it was not evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// As any evaluation.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
-    /// What was learned has no limits.
+    /// The learned table has no limits.
     #[error(
-        "tables of these slides have no limits: verification needs three textures at least, whitened features, and --method fused"
+        "tables of these slides have no limits: verification needs three textures at least, whitened features, and \
+         --method fused"
     )]
     NoLimits,
 }
@@ -88,7 +89,7 @@ impl From<learn::TableError> for VerifyError {
     }
 }
 
-/// Holds slides of each texture in turn against its own reference and against those of others.
+/// Compares slides of each texture in turn with its own reference and with those of others.
 ///
 /// # Errors
 /// See [`VerifyError`].
@@ -100,13 +101,13 @@ pub fn verify(
 ) -> Result<Verified, VerifyError> {
     let experiment = experiment.clone().each_slide_once();
     let config = Config {
-        // nothing is to be told apart: every movement takes its turn
+        // there is nothing to choose: every movement takes its turn
         strategy: Strategy::Cycling,
         open: true,
         ..config
     };
     let textures = experiment.names().len();
-    let visits: Vec<Vec<Visit>> = (0..runs)
+    let episodes: Vec<Vec<Episode>> = (0..runs)
         .into_par_iter()
         .panic_fuse()
         .map(|index| {
@@ -118,21 +119,21 @@ pub fn verify(
             for _ in 0..OTHERS {
                 references.push(other(run.random.random_range(0..textures - 1)));
             }
-            let visits = references.into_iter().map(|reference| {
+            let episodes = references.into_iter().map(|reference| {
                 // the same slides for all references
-                visit(&experiment, &bytes, config, run.clone(), reference)
+                episode(&experiment, &bytes, config, run.clone(), reference)
             });
-            let visits = visits.collect();
+            let episodes = episodes.collect();
             done();
-            visits
+            episodes
         })
         .collect::<Result<_, VerifyError>>()?;
-    let visits: Vec<Visit> = visits.into_iter().flatten().collect();
+    let episodes: Vec<Episode> = episodes.into_iter().flatten().collect();
     let told = |same: bool| {
-        let of: Vec<_> = visits.iter().filter(|v| v.is_same == same).collect();
+        let of: Vec<_> = episodes.iter().filter(|e| e.is_same == same).collect();
         let all = of.len().max(1) as f64;
         let share = |answer| of.iter().filter(|v| v.end.0 == answer).count() as f64 / all;
-        Told {
+        AnswerShares {
             same: share(Answer::Same),
             different: share(Answer::Different),
             unsure: share(Answer::Unsure),
@@ -140,23 +141,25 @@ pub fn verify(
         }
     };
     Ok(Verified {
-        verify: (0..SLIDES).map(|after| After::of(&visits, after)).collect(),
+        verify: (0..SLIDES)
+            .map(|after| After::of(&episodes, after))
+            .collect(),
         same: told(true),
         other: told(false),
     })
 }
 
-/// The slides of a run, held against one texture of the table.
-fn visit(
+/// Compares the slides of a run with one texture of the table.
+fn episode(
     experiment: &Experiment,
     bytes: &[u8],
     config: Config,
     mut run: Run<'_>,
     reference: usize,
-) -> Result<Visit, VerifyError> {
+) -> Result<Episode, VerifyError> {
     let candidates = [reference as u16];
     let mut explorer = explorer(bytes, experiment.measured(), config, Some(&candidates))?;
-    let mut visit = Visit {
+    let mut episode = Episode {
         is_same: run.unknown == reference,
         scores: [0.0; SLIDES],
         answers: [Answer::Unsure; SLIDES],
@@ -164,7 +167,7 @@ fn visit(
     };
     let mut made = 0;
     let mut missing = 0;
-    while made < SLIDES || visit.end.0 == Answer::Unsure && made < config.max_slides.into() {
+    while made < SLIDES || episode.end.0 == Answer::Unsure && made < config.max_slides.into() {
         let action = explorer.choose(&[], 0);
         let Some(slide) = run.slide(action.movement.into()) else {
             missing += 1;
@@ -177,34 +180,38 @@ fn visit(
             .observe(action, slide)
             .expect("every slide has the features that the table was learned from");
         let verification = explorer.verification().ok_or(VerifyError::NoLimits)?;
-        let after = visit.scores.iter_mut().zip(&mut visit.answers).nth(made);
+        let after = episode
+            .scores
+            .iter_mut()
+            .zip(&mut episode.answers)
+            .nth(made);
         if let Some((score, answer)) = after {
             (*score, *answer) = (verification.score.into(), verification.answer);
         }
         made += 1;
-        if visit.end.0 == Answer::Unsure {
-            visit.end = (verification.answer, made);
+        if episode.end.0 == Answer::Unsure {
+            episode.end = (verification.answer, made);
         }
     }
-    // where slides ran out, what was known last
+    // where slides ran out, the last state counts
     for after in made.max(1)..SLIDES {
-        visit.scores[after] = visit.scores[after - 1];
-        visit.answers[after] = visit.answers[after - 1];
+        episode.scores[after] = episode.scores[after - 1];
+        episode.answers[after] = episode.answers[after - 1];
     }
-    Ok(visit)
+    Ok(episode)
 }
 
 impl After {
-    fn of(visits: &[Visit], after: usize) -> Self {
+    fn of(episodes: &[Episode], after: usize) -> Self {
         let scores = |same: bool| {
-            let of = visits.iter().filter(|v| v.is_same == same);
+            let of = episodes.iter().filter(|e| e.is_same == same);
             let mut scores: Vec<f64> = of.map(|v| v.scores[after]).collect();
             scores.sort_by(f64::total_cmp);
             scores
         };
         let [own, others] = [scores(true), scores(false)];
         let answered = |same: bool, answer| {
-            let of = visits.iter().filter(|v| v.is_same == same);
+            let of = episodes.iter().filter(|e| e.is_same == same);
             let wrong = of.clone().filter(|v| v.answers[after] == answer).count();
             wrong as f64 / of.count().max(1) as f64
         };
@@ -219,7 +226,7 @@ impl After {
     }
 }
 
-/// Where false rejects and false accepts are equal, and the curve of both, of sorted scores.
+/// The rate at which false rejects and false accepts are equal, and the curve of both, of sorted scores.
 fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     let at = |limit: f64| {
         let rejected = own.len() - own.partition_point(|s| *s <= limit);
@@ -248,7 +255,7 @@ fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     (equal, at_limits.into_iter().map(at).collect())
 }
 
-/// Why a texture cannot be put into a table.
+/// Reasons why a texture cannot be put into a table.
 #[derive(Debug, thiserror::Error)]
 pub enum PutError {
     /// The table compares the paper's properties.
@@ -258,7 +265,8 @@ pub enum PutError {
     NotFused,
     /// A slide lacks features, or none is of a movement of the table.
     #[error(
-        "the reference has no slide at a movement of the table with the features that it compares: record it with this table"
+        "the reference has no slide at a movement of the table with the features that it compares: record it with this \
+         table"
     )]
     NothingInCommon,
     /// The table cannot be written.
@@ -301,11 +309,11 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
 
 /// More bytes than one texture takes in a table.
 const MOST_OF_ONE: usize = 4096;
-/// Visits that are drawn of each other texture.
+/// Episodes that are drawn of each other texture.
 const DRAWN: usize = 40;
 
-/// Share of visits of the table's other textures, drawn about their means and as long as that of `explorer`, that would be
-/// called the same as `reference`. `None` where the table has no other texture, or nothing was observed.
+/// Share of episodes of the table's other textures, drawn about their means and as long as that of `explorer`, that
+/// would be called the same as `reference`. `None` if the table has no other texture, or nothing was observed.
 pub fn false_accept<const N: usize>(explorer: &Explorer<'_, N>, reference: u16) -> Option<f64> {
     let table = explorer.table();
     let mut random = ChaCha8Rng::seed_from_u64(1);
@@ -313,16 +321,16 @@ pub fn false_accept<const N: usize>(explorer: &Explorer<'_, N>, reference: u16) 
         let twelve = (0..12).map(|_| random.random::<f32>()).sum::<f32>();
         twelve - 6.0
     };
-    let visits: Vec<(u8, u8)> = explorer.observed().map(|(m, k, _)| (m, k)).collect();
+    let observed: Vec<(u8, u8)> = explorer.observed().map(|(m, k, _)| (m, k)).collect();
     let (mut all, mut accepted) = (0, 0);
     for texture in (0..table.textures()).filter(|&texture| texture != reference) {
         let taught = |(movement, _): &(u8, u8)| table.trials(texture, *movement) > 0;
-        if visits.is_empty() || !visits.iter().all(taught) {
+        if observed.is_empty() || !observed.iter().all(taught) {
             continue;
         }
         for _ in 0..DRAWN {
-            let drawn = visits.iter().map(|&(movement, slides)| {
-                // the mean of the slides, and what is not known of the texture's own
+            let drawn = observed.iter().map(|&(movement, slides)| {
+                // the mean of the slides, and the uncertainty of the texture's own
                 let n = f32::from(table.trials(texture, movement));
                 let sd = (1.0 / f32::from(slides) + 1.0 / n).sqrt() * WHITE_STEPS;
                 let mean = table.white_mean(texture, movement);
@@ -399,7 +407,7 @@ mod tests {
             .learn_without(Method::Fused, &[5])
             .unwrap();
         let table = Table::read(&bytes).unwrap();
-        // two of each movement, and a third one of each to hold against it
+        // two of each movement, and a third one of each to compare with it
         let third = |texture: usize| -> Vec<MeasuredSlide> {
             let thirds = measured[texture].chunks(3).map(|trials| trials[2].clone());
             thirds.collect()
@@ -440,7 +448,7 @@ mod tests {
         };
         assert_eq!(answer(&third(5)), Answer::Same);
         assert_eq!(answer(&third(4)), Answer::Different);
-        // a slide of another movement than the table's says nothing
+        // a slide of another movement than the table's does not count
         let mut elsewhere = measured[5][0].clone();
         elsewhere.movement = Movement::grid()
             .find(|m| with.movements().all(|n| n != *m))

@@ -1,4 +1,4 @@
-//! What a display asks for, and what it gets.
+//! The requests of a display, and the replies.
 
 use serde::{Deserialize, Serialize};
 use tactus_core::explorer::ExpectedOutcome;
@@ -9,23 +9,22 @@ use tactus_core::wire::Phase;
 use super::standing::Standing;
 use crate::eval::transcript::Answer;
 
-/// The probe's world, and what it is to know.
+/// The probe's world, and its table.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 pub struct Settings {
-    /// The world: what its textures, motors and fingertip are like.
+    /// The world: seed of its textures, motors and fingertip.
     pub world: u64,
-    /// How many textures it knows, 2 to 117.
+    /// Number of textures that it knows, 2 to 117.
     pub textures: u8,
-    /// Whether it decides as published, one property a slide; otherwise by all features at once.
+    /// True to decide as published, one property a slide; otherwise by all features at once.
     pub paper: bool,
-    /// How much change of finger and samples it is to expect, in parts of the usual one (see
-    /// [`tactus_core::table::Drift`]).
+    /// Expected change of finger and samples, in parts of the usual one (see [`tactus_core::table::Drift`]).
     pub drift: f32,
-    /// Where the sample lies, and what the noise is like.
+    /// Seed of the sample's place and of the noise.
     pub trial: u64,
 }
 
-/// What a display asks for.
+/// The requests of a display.
 #[derive(Clone, PartialEq, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "kebab-case")]
 pub enum Request {
@@ -35,41 +34,41 @@ pub enum Request {
     World(Settings),
     /// The next part of the work until the probe is there: [`Reply::Preparing`], in the end [`Reply::Ready`].
     Prepare,
-    /// Puts a texture under the finger and has the probe find out what it is.
+    /// Puts a texture under the finger and asks the probe to identify it.
     Identify {
         /// Its number in Table 1.
         texture: u8,
-        /// For where on the sample slides begin.
+        /// Seed of the places on the sample where slides begin.
         seed: u32,
         /// A texture more probable than this is the answer.
         threshold: f32,
         /// Share of the known textures that may be taken for new ones; the table's own, unless given.
         false_alarm: Option<f32>,
-        /// After so many slides the most probable texture is the answer.
+        /// Number of slides after which the most probable texture is the answer.
         max_slides: u8,
     },
     /// Puts a texture under the finger and makes one movement.
     Move {
         /// Its number in Table 1.
         texture: u8,
-        /// For where on the sample the slide begins.
+        /// Seed of the place on the sample where the slide begins.
         seed: u32,
         /// Contact force, N.
         force_n: f32,
         /// Speed, mm/s.
         speed_mm_s: f32,
     },
-    /// What the texture of the last exploration is called: the probe learns it.
+    /// Names the texture of the last exploration: the probe learns it.
     Label {
         /// Its name, 1 to 31 bytes.
         name: String,
     },
     /// Puts a skin on the finger, 0 new to 1 without ridges.
     Skin {
-        /// How worn it is.
+        /// Its wear.
         wear: f64,
     },
-    /// Stops what is being done, and lifts the finger.
+    /// Stops the request, and lifts the finger.
     Stop,
     /// So many milliseconds pass, or less if the probe has nothing more to do: [`Reply::Frame`].
     Step {
@@ -97,21 +96,21 @@ pub enum Reply {
     },
     /// The probe waits for requests.
     Ready(KnownTable),
-    /// What has been since the last one.
+    /// The events since the last one.
     Frame(Frame),
-    /// The request makes no sense, and why.
+    /// The request is invalid; the reason.
     Error {
         /// A sentence.
         why: String,
     },
 }
 
-/// What the probe knows.
+/// The probe's textures and movements.
 #[derive(Clone, PartialEq, Debug, Serialize, Default)]
 pub struct KnownTable {
     /// Names of its textures, in the order of the table.
     pub textures: Vec<String>,
-    /// Their numbers in Table 1; `None` for one that was taught under a name that is not there.
+    /// Their numbers in Table 1; `None` for one that was taught under another name.
     pub numbers: Vec<Option<u8>>,
     /// The movements: force, N, and speed, mm/s.
     pub movements: Vec<(f32, f32)>,
@@ -125,18 +124,18 @@ pub struct KnownTable {
     pub crc: u32,
 }
 
-/// A moment of the probe, and what has happened since the last one.
+/// A moment of the probe, with the events since the last one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Frame {
     /// Time of the rig, ms.
     pub at_ms: u64,
-    /// Whether the probe is at work.
+    /// True if the probe is at work.
     pub busy: bool,
-    /// What the rig does.
+    /// Phase of the rig.
     pub phase: Phase,
     /// Height of the undeformed fingertip over the steel plate, mm.
     pub tip_mm: f64,
-    /// How deep the sample pushes into it, mm; negative is a gap.
+    /// Depth of the sample in it, mm; negative is a gap.
     pub indentation_mm: f64,
     /// Place of the stage, mm from its lower hard stop.
     pub stage_mm: f64,
@@ -146,7 +145,7 @@ pub struct Frame {
     pub force_n: f64,
     /// Shear on the stage, N.
     pub shear_n: f64,
-    /// Number in Table 1 of what lies under the finger.
+    /// Number in Table 1 of the texture under the finger.
     pub texture: u8,
     /// Wear of the skin, 0 to 1.
     pub wear: f64,
@@ -156,11 +155,11 @@ pub struct Frame {
     pub pdc: Vec<u16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
     pub spectra: Vec<Vec<i8>>,
-    /// What the probe said.
+    /// The probe's events.
     pub happened: Vec<Happening>,
 }
 
-/// What a probe said.
+/// An event of a probe.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(tag = "what", rename_all = "kebab-case")]
 #[allow(clippy::large_enum_variant)] // a few at a time
@@ -173,14 +172,14 @@ pub enum Happening {
         movement: u8,
         /// The one property that is looked at; `None` for all features.
         property: Option<&'static str>,
-        /// What the best actions are expected to bring, best first.
+        /// Expected results of the best actions, best first.
         expected: Vec<Expected>,
     },
     /// The slide has reached a length that the table knows.
     Look {
         /// At constant speed.
         ms: u16,
-        /// What is known if it ended now; `None` where the table cannot tell.
+        /// The posterior if it ended now; `None` if the table has no statistics for it.
         standing: Option<Standing>,
         /// Its place among the textures at this movement.
         place: Option<(f64, f64)>,
@@ -191,27 +190,27 @@ pub enum Happening {
         slide: u8,
         /// Of the movement.
         movement: u8,
-        /// Where it ended early: after so many ms at constant speed.
+        /// Its length in ms at constant speed, if it ended early.
         early_ms: Option<u16>,
-        /// What it measured.
+        /// Its measurements.
         measured: Measured,
-        /// What is known now.
+        /// The posterior now.
         standing: Standing,
         /// Its place among the textures at this movement.
         place: Option<(f64, f64)>,
     },
-    /// A slide that was asked for by hand was made.
+    /// A slide by a direct request was made.
     Moved {
         /// Of the movement, where the table has it.
         movement: Option<u8>,
-        /// What it measured.
+        /// Its measurements.
         measured: Measured,
         /// Its place among the textures at this movement.
         place: Option<(f64, f64)>,
     },
     /// The slide does not count.
     Rejected {
-        /// Why.
+        /// The reason.
         why: String,
     },
     /// The answer.
@@ -221,7 +220,7 @@ pub enum Happening {
         answer: Answer,
         /// Index of the texture in the table.
         index: u16,
-        /// Whether the probe asks what it is.
+        /// True if the probe asks for a label.
         wants_label: bool,
     },
     /// A texture was learned: the table is another one now.
@@ -239,41 +238,41 @@ pub enum Happening {
         slide: u32,
         /// `same`, `different` or `unsure`.
         answer: &'static str,
-        /// That in words.
+        /// The answer in words.
         said: String,
     },
     /// A verification is over.
     Verified {
         /// `same`, `different` or `unsure`.
         answer: &'static str,
-        /// That in words, and what it is worth.
+        /// The answer in words, and its error rates.
         said: String,
     },
     /// A slide of recordings.
     Recorded {
-        /// Which of them, from 0.
+        /// Its index, from 0.
         at: usize,
-        /// What it was recorded on.
+        /// Its texture.
         texture: String,
         /// Its number.
         number: u32,
         /// Force, N, and speed, mm/s.
         movement: (f32, f32),
-        /// What it measured.
+        /// Its measurements.
         measured: Option<Measured>,
-        /// Why it measured nothing.
+        /// The reason why it has none.
         why: Option<String>,
     },
-    /// What was asked for is not done.
+    /// The request was refused.
     Refused {
-        /// Why, and what to do.
+        /// The reason, and a remedy.
         why: String,
     },
-    /// What was asked for is over.
+    /// The request is done.
     Done,
 }
 
-/// What an action is expected to bring.
+/// Expected result of an action.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Expected {
     /// Of the movement.
@@ -302,7 +301,7 @@ pub(super) fn name(action: Action) -> Option<&'static str> {
     action.property.map(Property::name)
 }
 
-/// What a slide measured.
+/// Measurements of a slide.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Measured {
     /// Force of its movement, N.

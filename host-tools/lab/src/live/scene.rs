@@ -1,4 +1,4 @@
-//! What is seen of a probe: its host in the simulation.
+//! The view of a probe: its host in the simulation.
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -7,8 +7,8 @@ use tactus_core::probe::RigState;
 use tactus_core::rig::{Phase, RigError};
 use tactus_core::wire::Event;
 
-use super::hearing::{Hearing, Received};
 use super::message::{Frame, Happening};
+use super::monitor::{ProbeMonitor, Received};
 use crate::sim::probe::Host;
 use crate::sim::rig::SimRig;
 use tactus_world::world::Truth;
@@ -16,18 +16,18 @@ use tactus_world::world::Truth;
 /// P_DC is shown so often, ms.
 const PDC_MS: u64 = 10;
 
-/// What is under way, and what was seen since the last frame.
+/// The work in progress, and the events since the last frame.
 pub(super) struct Scene {
     /// The time at which it stands still; `None`: it does not.
     pub(super) until: Option<Duration>,
-    /// Whether somebody waits for it to go on.
+    /// True if a request waits for it to continue.
     pub(super) waits: Cell<bool>,
-    /// What is to be done to the rig before its next millisecond.
+    /// Changes of the rig before its next millisecond.
     texture: Option<u8>,
     pub(super) wear: Option<f64>,
     pub(super) stop: bool,
-    /// What the probe says.
-    pub(super) hearing: Hearing,
+    /// The probe's messages.
+    pub(super) monitor: ProbeMonitor,
     now: Duration,
     phase: Phase,
     truth: Truth,
@@ -43,7 +43,7 @@ impl Scene {
             texture: None,
             wear: None,
             stop: false,
-            hearing: Hearing::default(),
+            monitor: ProbeMonitor::default(),
             now: Duration::ZERO,
             phase: Phase::Parked,
             truth: Truth::default(),
@@ -57,7 +57,7 @@ impl Scene {
         self.now
     }
 
-    /// Number of what lies under the finger.
+    /// Number of the texture under the finger.
     pub(super) fn texture(&self) -> u8 {
         self.truth.texture
     }
@@ -66,13 +66,13 @@ impl Scene {
     pub(super) fn place(&mut self, texture: u8, lifted: Result<(), RigError>) {
         match lifted {
             Ok(()) => self.texture = Some(texture),
-            Err(why) => self.hearing.happens(Happening::Refused {
+            Err(why) => self.monitor.happens(Happening::Refused {
                 why: why.to_string(),
             }),
         }
     }
 
-    /// What has been since the last frame.
+    /// Takes the events since the last frame.
     pub(super) fn frame(&mut self) -> Frame {
         let Truth {
             tip_mm,
@@ -89,7 +89,7 @@ impl Scene {
             pac,
             spectra,
             happened,
-        } = self.hearing.take();
+        } = self.monitor.take();
         Frame {
             at_ms: self.now.as_millis() as u64,
             busy: self.busy,
@@ -112,13 +112,13 @@ impl Scene {
 
 impl Host for Scene {
     fn tell(&mut self, event: Event) {
-        self.hearing.hear(event);
+        self.monitor.hear(event);
     }
 
     fn tick(&mut self, now: Duration, rig: &RigState) {
         self.now = now;
         if let (Phase::Faulted(fault), true) = (rig.phase, rig.phase != self.phase) {
-            self.hearing.happens(Happening::Refused {
+            self.monitor.happens(Happening::Refused {
                 why: fault.to_string(),
             });
         }
@@ -130,7 +130,7 @@ impl Host for Scene {
             && let Err(why) = rig.place(texture)
         {
             let why = why.to_string();
-            self.hearing.happens(Happening::Refused { why });
+            self.monitor.happens(Happening::Refused { why });
         }
         if let Some(wear) = self.wear
             && rig.world().put_on_skin(wear).is_ok()

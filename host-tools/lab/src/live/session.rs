@@ -1,4 +1,4 @@
-//! A probe that is asked, and goes on as far as it is let.
+//! A probe that takes requests, and runs for as long as its caller allows.
 
 use std::cell::RefCell;
 use std::future::Future;
@@ -8,7 +8,6 @@ use std::task::{Context, Waker};
 use std::time::Duration;
 
 use embassy_futures::yield_now;
-use tactus_core::dsp::Plain;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, Slide};
 use tactus_core::probe::seams::RigHandle as _;
@@ -28,7 +27,7 @@ use crate::sim::rig::SimRig;
 use tactus_world::textures::TEXTURES;
 use tactus_world::world::Setup;
 
-/// Everything that a probe does for one request.
+/// The work of a probe for one request.
 enum Job {
     Serve(Box<Command>),
     Move(Movement, u32),
@@ -44,7 +43,7 @@ impl Job {
     }
 }
 
-/// What waits for its turn.
+/// The job that waits for its turn.
 type Desk = Rc<RefCell<Option<(Job, Option<u8>)>>>;
 
 /// A world in the making.
@@ -63,7 +62,7 @@ struct Running {
     life: Pin<Box<dyn Future<Output = ()>>>,
 }
 
-/// Somebody watches a simulated probe.
+/// A viewer's session with a simulated probe.
 #[derive(Default)]
 pub struct Session {
     preparing: Option<Preparing>,
@@ -73,7 +72,7 @@ pub struct Session {
 type Answered = Result<Reply, Box<dyn std::error::Error>>;
 
 impl Session {
-    /// Does what is asked for, in JSON: a [`Request`], and a [`Reply`].
+    /// Carries out a request in JSON: a [`Request`], and a [`Reply`].
     pub fn ask(&mut self, request: &str) -> String {
         let reply = match serde_json::from_str(request) {
             Ok(request) => self.answer(request).unwrap_or_else(|why| Reply::Error {
@@ -218,7 +217,7 @@ impl Session {
             life: Box::pin(life),
         };
         running.poll();
-        let known = running.scene.borrow().hearing.known().clone();
+        let known = running.scene.borrow().monitor.known().clone();
         if known.textures.is_empty() {
             return Err("the probe does not start".into());
         }
@@ -253,7 +252,7 @@ fn shimmed(setup: Setup) -> Setup {
     }
 }
 
-/// What went wrong, with its causes.
+/// An error with its causes.
 pub fn sentence(why: &dyn std::error::Error) -> String {
     let mut sentence = why.to_string();
     let mut cause = why.source();
@@ -277,7 +276,7 @@ impl Running {
             let mut scene = self.scene.borrow_mut();
             scene.until = Some(scene.now() + Duration::from_millis(ms.into()));
         }
-        // a store that writes lets others go first, too: on until it waits for the time, or for a job
+        // a store that writes lets others run first, too: keep going until it waits for the time, or for a job
         let goes_on = |running: &Self| {
             let scene = running.scene.borrow();
             scene.busy && !scene.waits.get()
@@ -303,7 +302,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     let mut probe = match on {
         Ok(probe) => probe,
         Err(why) => {
-            scene.borrow_mut().hearing.happens(Happening::Refused {
+            scene.borrow_mut().monitor.happens(Happening::Refused {
                 why: why.to_string(),
             });
             return std::future::pending().await;
@@ -313,11 +312,11 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     loop {
         {
             let mut scene = scene.borrow_mut();
-            scene.hearing.knows(probe.memory.in_force());
-            scene.hearing.learned();
+            scene.monitor.knows(probe.memory.in_force());
+            scene.monitor.learned();
             scene.busy = false;
             scene.stop = false;
-            // nothing moves: whatever is due is done
+            // nothing moves: every due change is made
             scene.until = None;
         }
         let (job, texture) = loop {
@@ -329,7 +328,7 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
         // a new request gets its time with the next step
         scene.borrow_mut().busy = true;
         if let Some(texture) = texture.filter(|texture| scene.borrow().texture() != *texture) {
-            // whoever changes the sample lifts the finger out of the way first
+            // a change of the sample needs the finger out of the way first
             let lifted = probe.rig.lift().await;
             scene.borrow_mut().place(texture, lifted);
         }
@@ -338,16 +337,16 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
                 let command = *command;
                 if let (Command::Identify(wanted), Ok(table)) = (&command, probe.memory.table()) {
                     let config = wanted.config(table.contents());
-                    scene.borrow_mut().hearing.explores(config);
+                    scene.borrow_mut().monitor.explores(config);
                 }
                 id = u16::wrapping_add(id, 1);
                 let request = wire::Request { id, command };
-                probe.serve::<Plain>(&request).await;
+                probe.serve(&request).await;
             }
             Job::Move(movement, seed) => {
                 let made = make(&mut probe, &scene, movement, seed).await;
-                scene.borrow_mut().hearing.happens(made);
-                scene.borrow_mut().hearing.happens(Happening::Done);
+                scene.borrow_mut().monitor.happens(made);
+                scene.borrow_mut().monitor.happens(Happening::Done);
             }
         }
     }
@@ -362,7 +361,7 @@ async fn make<'p>(
 ) -> Happening {
     probe.memory.episode = None;
     probe.rig.begin(seed).await;
-    let mut slide = Slide::<Plain>::new(&PLAN, movement);
+    let mut slide = Slide::new(&PLAN, movement);
     let made = match probe.rig.perform(&mut slide).await {
         Ok(()) => probe.rig.lifted().await,
         Err(why) => Err(why),
@@ -384,7 +383,7 @@ async fn make<'p>(
                 movement: at,
                 place: at
                     .zip(table)
-                    .and_then(|(at, table)| scene.borrow().hearing.place_of(table, at, &seen)),
+                    .and_then(|(at, table)| scene.borrow().monitor.place_of(table, at, &seen)),
                 measured: Measured::new(movement, &seen),
             }
         }

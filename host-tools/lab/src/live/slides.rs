@@ -1,4 +1,4 @@
-//! What a watched probe has learned from: trials of a simulated world, made here or before.
+//! The slides that a watched probe has learned from: trials of a simulated world, made here or before.
 
 use std::sync::OnceLock;
 
@@ -77,11 +77,11 @@ fn made_before() -> &'static [u8] {
 
 /// Brings the trials of [`WORLD`] to a program without them, before anything asks for them; once is enough.
 pub fn bring_world(trials: Vec<u8>) {
-    // those that came first are the same
+    // the first ones are the same
     let _ = BROUGHT.set(trials);
 }
 
-/// Why the table of the world that comes with the program is not there.
+/// Reasons why the table of the world that comes with the program is missing.
 #[derive(Debug, thiserror::Error)]
 pub enum WorldError {
     /// Its trials are of another version.
@@ -95,7 +95,7 @@ pub enum WorldError {
 /// The table of all textures of [`WORLD`], of all features.
 ///
 /// # Errors
-/// What comes with the program is not of this version.
+/// Contents that come with the program are not of this version.
 pub fn world_table() -> Result<Vec<u8>, WorldError> {
     Ok(table(&Trials::of_world()?, false, 1.0)?)
 }

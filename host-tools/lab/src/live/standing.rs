@@ -1,4 +1,4 @@
-//! What is known at a moment of an exploration: the core's explorer, given the slides so far and the one that goes on.
+//! The posterior at a moment of an exploration: the core's explorer with the slides so far and the current one.
 
 use std::sync::LazyLock;
 
@@ -12,18 +12,16 @@ use tactus_core::table::{Action, MAX_TEXTURES, Table};
 /// Coefficients and angles, for all slides.
 pub(super) static PLAN: LazyLock<Plan> = LazyLock::new(Plan::new);
 
-/// What is known.
+/// The posterior, with the checks for new and changed textures.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Standing {
     /// Probability of each texture of the table.
     pub posterior: Vec<f32>,
-    /// By how much the slides are less like any of the textures than they may be, where the table can tell; above 0:
-    /// new.
+    /// Excess of the slides' distance from all textures over its limit, if the table has one; above 0: new.
     pub log_odds: Option<f32>,
-    /// Whether they are not like the most probable one as that was learned.
+    /// True if they differ from the most probable one as that was learned.
     pub changed: bool,
-    /// By how much they are less like any of the textures, as these were learned, than they may be; above 0: changed,
-    /// or new.
+    /// Excess of their distance from all textures as learned over its limit; above 0: changed, or new.
     pub changed_by: Option<f32>,
 }
 
@@ -39,7 +37,7 @@ impl Standing {
     }
 }
 
-/// An exploration from outside: what its probe said so far.
+/// An exploration from outside: its messages so far.
 #[derive(Debug, Default)]
 pub(super) struct Followed {
     config: Config,
@@ -71,7 +69,7 @@ impl Followed {
         self.action.map(|action| action.movement)
     }
 
-    /// Samples of the slide have come: where it has reached one of the table's lengths, that in ms, and what it says so
+    /// Takes samples of the slide; returns the length in ms if it has reached one of the table's, with its features so
     /// far.
     pub(super) fn block(
         &mut self,
@@ -89,12 +87,12 @@ impl Followed {
         Some((ms, Observation::from(&slide.look(wanted).ok()?)))
     }
 
-    /// What would be known if the slide had ended at the length that it has reached.
+    /// The posterior if the slide had ended at the length that it has reached.
     pub(super) fn so_far(&self, table: Table<'_>, seen: &Observation) -> Option<Standing> {
         self.standing(table, Some((self.action?, self.reached as u8, seen)))
     }
 
-    /// The slide has come to its end; what is known then.
+    /// The slide has ended; returns the posterior.
     pub(super) fn observed(
         &mut self,
         table: Table<'_>,
@@ -111,7 +109,7 @@ impl Followed {
         self.standing(table, None)
     }
 
-    /// What is known after the whole slides so far and, if there is one, a slide up to a length of the table.
+    /// The posterior after the whole slides so far and, if there is one, a slide up to a length of the table.
     fn standing(
         &self,
         table: Table<'_>,

@@ -152,7 +152,7 @@ impl Content {
             "/features" => {
                 let measured = measured(&serde_json::from_slice(data)?);
                 if let Some(slide) = self.recorded.slides.last_mut() {
-                    slide.measured = Ok((measured.clone(), None));
+                    slide.measured = Ok(measured.clone());
                 }
                 self.features = Some(measured);
             }
@@ -327,6 +327,7 @@ fn measured(told: &Value) -> SlideReport {
         background: 0.0,
         bands: Default::default(),
         pressure: None,
+        pace: None,
     };
     for band in list("ln_bands") {
         // of more than there are, nothing is known

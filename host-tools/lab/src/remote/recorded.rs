@@ -14,7 +14,7 @@ use crate::data::replay::measure;
 use crate::eval::learn::learn;
 use crate::eval::show::count;
 use crate::eval::transcript::Answer;
-use crate::live::{Expected, Happening, Hearing, Measured, Standing, spectra, world_table};
+use crate::live::{Expected, Happening, Measured, ProbeMonitor, Standing, spectra, world_table};
 use crate::sim::collection::Collection;
 
 /// Slides of each texture at a movement of which one can be left out: a table needs two.
@@ -47,8 +47,8 @@ pub(super) struct RecordedSlide {
     pub(super) pdc: Stream,
     /// Tangential force, mN; empty where it was not measured.
     pub(super) shear_mn: Stream,
-    /// What the slide says, and its pace; else why it says nothing.
-    pub(super) measured: std::result::Result<(SlideReport, Option<i16>), String>,
+    /// The features of the slide, or the reason why it has none.
+    pub(super) measured: std::result::Result<SlideReport, String>,
 }
 
 /// Samples, so many a second.
@@ -261,11 +261,11 @@ impl Recorded {
         let Ok(mut explorer) = explorer.map(Box::new) else {
             return;
         };
-        let mut hearing = Hearing::default();
-        hearing.knows(&judge.table);
+        let mut monitor = ProbeMonitor::default();
+        monitor.knows(&judge.table);
         frame
             .tables
-            .push((frame.happened.len(), hearing.known().clone()));
+            .push((frame.happened.len(), monitor.known().clone()));
         for texture in judge
             .slides
             .chunk_by(|a, b| self.slides[*a].texture == self.slides[*b].texture)
@@ -304,7 +304,7 @@ impl Recorded {
                     early_ms: None,
                     measured: Measured::new(slide.movement, &seen),
                     standing: Standing::of(&explorer),
-                    place: hearing.place_of(table, movement, &seen),
+                    place: monitor.place_of(table, movement, &seen),
                 });
             }
             if explorer.slides() > 0 {
@@ -325,7 +325,7 @@ impl RecordedSlide {
         let still = pac.len();
         pac.extend(moving);
         let measured = measure(plan, slide)
-            .map(|measured| (SlideReport::from(&measured), measured.pace))
+            .map(|measured| SlideReport::from(&measured))
             .map_err(|why| why.to_string());
         Self {
             texture: slide.texture,
@@ -346,15 +346,11 @@ impl RecordedSlide {
     }
 
     fn observation(&self) -> Option<Observation> {
-        let (report, pace) = self.measured.as_ref().ok()?;
-        Some(Observation {
-            pace: *pace,
-            ..report.observation()
-        })
+        Some(self.measured.as_ref().ok()?.observation())
     }
 
     fn has_traction(&self) -> bool {
         let report = self.measured.as_ref();
-        report.is_ok_and(|(report, _)| report.properties[0].is_some())
+        report.is_ok_and(|report| report.properties[0].is_some())
     }
 }

@@ -8,7 +8,7 @@ use super::verifying::{Verifying, config_of, words};
 #[cfg(feature = "open")]
 use crate::eval::show::count;
 use crate::eval::verified::{Slide, print_answer, print_slide};
-use crate::live::{Happening, Hearing};
+use crate::live::{Happening, ProbeMonitor};
 #[cfg(feature = "open")]
 use tactus_link::log;
 use tactus_link::log::{Line, TableParts};
@@ -27,7 +27,7 @@ pub(super) fn replay(log: &[u8]) -> Result<Frame, log::LogError> {
 /// A session by its log: one that is heard again, or one that goes on.
 #[derive(Default)]
 pub(super) struct Replay {
-    hearing: Hearing,
+    monitor: ProbeMonitor,
     /// the one in use
     table: Vec<u8>,
     parts: TableParts,
@@ -68,10 +68,10 @@ impl Replay {
     /// The probe uses this table from now on.
     pub(super) fn table(&mut self, whole: Vec<u8>) {
         self.judged();
-        self.hearing.knows(&whole);
-        self.hearing.learned();
+        self.monitor.knows(&whole);
+        self.monitor.learned();
         self.take();
-        let known = self.hearing.known().clone();
+        let known = self.monitor.known().clone();
         self.frame.tables.push((self.frame.happened.len(), known));
         self.table = whole;
     }
@@ -83,7 +83,7 @@ impl Replay {
                 self.judged();
                 let config = self.in_use().map(|table| asked.config(table.contents()));
                 if let Some(config) = config {
-                    self.hearing.explores(config);
+                    self.monitor.explores(config);
                 }
             }
             Command::Verify(asked) => {
@@ -109,17 +109,17 @@ impl Replay {
             return;
         }
         let Some((_, events)) = &mut self.verification else {
-            self.hearing.hear(event);
+            self.monitor.hear(event);
             return;
         };
         if self.live {
-            self.hearing.hear(event.clone());
+            self.monitor.hear(event.clone());
         }
         match event {
             Event::Done(_) => self.judged(),
             Event::Rejected { .. } | Event::Refused { .. } | Event::Trouble(_) => {
                 if !self.live {
-                    self.hearing.hear(event);
+                    self.monitor.hear(event);
                 }
             }
             // samples judge nothing
@@ -132,7 +132,7 @@ impl Replay {
                     false => None,
                 };
                 if let Some(slide) = judged {
-                    self.hearing.happens(Happening::Judged {
+                    self.monitor.happens(Happening::Judged {
                         slide: slide.number,
                         answer: slide.answer,
                         said: words(|out| print_slide(&slide, out)),
@@ -146,7 +146,7 @@ impl Replay {
     #[cfg(feature = "open")]
     pub(super) fn refused(&mut self, at_ms: u32, why: &str) {
         self.frame.at_ms = at_ms;
-        self.hearing.happens(Happening::Refused {
+        self.monitor.happens(Happening::Refused {
             why: why.to_owned(),
         });
     }
@@ -172,7 +172,7 @@ impl Replay {
         self.verification = None;
         if let Some(verified) = verified {
             let said = words(|out| print_answer(&verified, out));
-            self.hearing.happens(Happening::Verified {
+            self.monitor.happens(Happening::Verified {
                 answer: verified.answer,
                 said,
             });
@@ -180,7 +180,7 @@ impl Replay {
     }
 
     fn take(&mut self) {
-        let heard = self.hearing.take();
+        let heard = self.monitor.take();
         self.frame.pac.extend(heard.pac);
         self.frame.spectra.extend(heard.spectra);
         self.frame.happened.extend(heard.happened);

@@ -1,7 +1,7 @@
 //! A verification of the probe, held against the other textures of its table here.
 
 use tactus_core::explorer::{Config, Explorer, ExplorerError, Method, Strategy};
-use tactus_core::features::{Movement, Observation, PropertySet};
+use tactus_core::features::{Movement, PropertySet};
 use tactus_core::table::{MAX_TEXTURES, Table, TableError};
 use tactus_core::wire::{Event, Identify};
 
@@ -15,7 +15,6 @@ pub struct Verifying<'t> {
     /// what the probe says of its slides, held against the other textures here
     here: Box<Explorer<'t, MAX_TEXTURES>>,
     movement: Option<Movement>,
-    pace: Option<i16>,
 }
 
 /// Why a probe's table verifies nothing.
@@ -57,7 +56,6 @@ impl<'t> Verifying<'t> {
             texture,
             here: Box::new(Explorer::among(table, PropertySet::ALL, config, [texture])?),
             movement: None,
-            pace: None,
         })
     }
 
@@ -70,16 +68,11 @@ impl<'t> Verifying<'t> {
     pub fn hear(&mut self, event: &Event) -> Option<&Slide> {
         match event {
             Event::Chosen { movement, .. } => self.movement = Some(*movement),
-            Event::Pace(measured) => self.pace = Some(*measured),
             Event::SlideReport {
                 action, observed, ..
             } => {
                 // a slide that says nothing here is the probe's to judge
-                let observation = Observation {
-                    pace: self.pace.take(),
-                    ..observed.observation()
-                };
-                let _ = self.here.observe(*action, &observation);
+                let _ = self.here.observe(*action, &observed.observation());
             }
             Event::Verified { slides, now, .. } => {
                 let slide = Slide {

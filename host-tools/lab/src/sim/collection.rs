@@ -21,7 +21,7 @@ use tactus_world::world::Setup;
 /// Textures of a simulated world, to record and to learn.
 #[derive(Clone, Debug)]
 pub struct Collection {
-    /// The world's seed: what its textures, motors and fingertip are like.
+    /// The world's seed: its textures, motors and fingertip.
     pub seed: u64,
     /// Numbers of the textures in Table 1.
     pub textures: Vec<u8>,
@@ -37,7 +37,7 @@ impl Collection {
         Movement::FOR_ROUGHNESS,
     ];
 
-    /// The lengths after which a slide may end, ms at constant speed, where nothing else is asked for.
+    /// The default lengths after which a slide may end, ms at constant speed.
     pub const LENGTHS_MS: [u16; 3] = [500, 1000, 2000];
 
     /// The textures of a collection of `among` that holds `unknown`: the others are spread over Table 1.
@@ -52,7 +52,7 @@ impl Collection {
         textures
     }
 
-    /// Begins a folder of recordings of it, or goes on with one that was interrupted.
+    /// Begins a folder of recordings of it, or continues one that was interrupted.
     ///
     /// # Errors
     /// The folder cannot be written, or holds other recordings.
@@ -114,8 +114,8 @@ impl Collection {
             .collect()
     }
 
-    /// Records all trials of all textures, textures side by side; `done` hears of each. Per texture, its slides in the
-    /// order of time.
+    /// Records all trials of all textures, textures side by side; `done` is called after each. Returns the slides of
+    /// each texture in the order of time.
     ///
     /// # Errors
     /// The first fault of a rig.
@@ -225,7 +225,8 @@ impl Collection {
         Ok(named.map_err(TableError::from)?)
     }
 
-    /// As [`Collection::learn`], with what slides say after each of these lengths, in ms at constant speed, the shortest first.
+    /// As [`Collection::learn`], with statistics of slides after each of these lengths, in ms at constant speed, the
+    /// shortest first.
     ///
     /// # Errors
     /// The first fault of a rig, or slide without properties; lengths that no table has.
@@ -249,7 +250,8 @@ impl Collection {
         Ok(named.map_err(TableError::from)?)
     }
 
-    /// What the slides of a texture say, whole and after each of these lengths, in ms at constant speed: movement by movement.
+    /// The features of the slides of a texture, whole and after each of these lengths, in ms at constant speed:
+    /// movement by movement.
     ///
     /// # Errors
     /// [`TrialError::Slide`].
@@ -300,7 +302,7 @@ impl Collection {
         )?)
     }
 
-    /// What these slides say: of each texture, of each movement, of each trial.
+    /// The features of these slides: of each texture, of each movement, of each trial.
     fn measure(
         &self,
         movements: &[Movement],
@@ -320,7 +322,7 @@ impl Collection {
     }
 }
 
-/// Where in a simulated world something failed.
+/// The place of a failure in a simulated world.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Trial {
     /// The world's seed.
@@ -332,7 +334,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// What the rig made in this trial.
+    /// Adds the place of this trial to an error of the rig.
     ///
     /// # Errors
     /// [`TrialError::Rig`].
@@ -362,34 +364,34 @@ impl fmt::Display for Trial {
     }
 }
 
-/// Why a trial in a simulated world gave nothing.
+/// Reasons why a trial in a simulated world failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrialError {
     /// The rig failed.
     #[error("{at}: the simulated rig failed; another seed makes another world")]
     Rig {
-        /// Where.
+        /// Its place.
         at: Trial,
-        /// How.
+        /// The rig's error.
         source: SimError,
     },
     /// The slide has no properties.
     #[error("{at}: the slide has no properties; another seed makes another world")]
     Slide {
-        /// Where.
+        /// Its place.
         at: Trial,
-        /// Why.
+        /// The reason.
         source: SlideError,
     },
 }
 
-/// Why no table was learned in a simulated world.
+/// Reasons why no table was learned in a simulated world.
 #[derive(Debug, thiserror::Error)]
 pub enum LearnError {
     /// A rig failed.
     #[error(transparent)]
     Rig(#[from] SimError),
-    /// A trial gave nothing.
+    /// A trial failed.
     #[error(transparent)]
     Trial(#[from] TrialError),
     /// A recorded slide has no properties on the simulated rig.
@@ -401,7 +403,7 @@ pub enum LearnError {
         texture: String,
         /// Which of the slides to learn from, from 1.
         slide: usize,
-        /// Why.
+        /// The reason.
         source: SlideError,
     },
     /// The table cannot be learned.
@@ -424,7 +426,7 @@ pub fn plain_name(name: &str) -> String {
     words.join("-").to_lowercase()
 }
 
-/// Number of a texture by its name in Table 1, whatever its capitals and what is between its words, or by its number.
+/// Number of a texture by its name in Table 1, with any capitals and separators, or by its number.
 pub fn texture_number(name: &str) -> Option<u8> {
     let number = name.trim_start_matches(['T', 't']).parse().ok();
     let plain = plain_name(name);
@@ -478,7 +480,7 @@ pub fn record_texture(
     Ok(slides)
 }
 
-/// What comes after a trial.
+/// The step after a trial.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {
     /// The next one.
@@ -487,11 +489,11 @@ pub enum Next {
     Movement,
 }
 
-/// Powers up a rig and makes trials of what lies under it, movement by movement; `each` gets every slide, or why the rig did
-/// not make it, and says what comes next.
+/// Powers up a rig and makes trials of the texture under it, movement by movement; `each` gets every slide, or the
+/// reason why the rig did not make it, and returns the next step.
 ///
 /// # Errors
-/// See [`TrialError`], and what `each` returns.
+/// See [`TrialError`], and the errors of `each`.
 pub fn record_trials(
     rig: &mut SimRig,
     at: Trial,
@@ -528,8 +530,8 @@ mod tests {
 
     use super::*;
 
-    /// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this simulator. All of
-    /// each is compared by `cargo xtask campaign factory`.
+    /// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this
+    /// simulator. All of each is compared by `cargo xtask campaign factory`.
     #[test]
     fn factory_tables_are_of_this_world() {
         // the image of this one ends slides early
@@ -565,8 +567,8 @@ mod tests {
                         // two roundings
                         assert!(
                             (mean - f64::from(known)).abs() <= 2.0,
-                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if simulator or features \
-                             were changed on purpose: cargo xtask campaign factory -- --write"
+                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if \
+                             simulator or features were changed on purpose: cargo xtask campaign factory -- --write"
                         );
                     }
                 }

@@ -1,8 +1,8 @@
-//! One case of the campaign of faults: a probe on the simulated rig is asked for something, one to three things break
+//! One case of the campaign of faults: a probe on the simulated rig gets a request, one to three things break
 //! meanwhile, and bits of its flash change before it is switched on again. All of it comes from a seed.
 //!
-//! Judged is the world: the force on the finger, what moves in the end, what is still stored, and whether a repaired rig
-//! works.
+//! The campaign checks the world: the force on the finger, motion at the end, the contents of the store, and whether a
+//! repaired rig works.
 
 pub mod naming;
 
@@ -14,7 +14,7 @@ use embassy_futures::block_on;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus_core::dsp::{self, Plain};
+use tactus_core::dsp;
 use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::Unguarded;
@@ -33,19 +33,19 @@ use super::rig::{SimError, SimRig};
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;
 
-/// A rig that is repaired is asked to home so often.
+/// Number of tries to home for a rig that is repaired.
 pub const HOMINGS: usize = 3;
 /// The share of false alarms that the probe is set to.
 pub const SHARE: f32 = 0.03;
-/// A finger that is lifted feels no more than this, N.
+/// Largest force on a lifted finger, N.
 pub const LIFTED_N: f64 = 0.02;
-/// A stage that stands is no faster, mm/s.
+/// Largest speed of a stage that stands, mm/s.
 pub const STANDS_MM_S: f64 = 0.5;
-/// A lever that stands goes no farther, mm, in [`STILL_MS`].
+/// Largest way of a lever that stands, mm, in [`STILL_MS`].
 pub const STILL_MM: f64 = 0.01;
 /// See [`STILL_MM`].
 pub const STILL_MS: u32 = 500;
-/// A rig is at rest at the latest after this, s.
+/// Time until a rig is at rest at the latest, s.
 pub const REST_S: u64 = 120;
 
 /// The world that the table of the firmware is learned from.
@@ -57,12 +57,12 @@ pub fn world() -> Collection {
     }
 }
 
-/// What the probe is asked for.
+/// The request to the probe.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Activity {
     /// To find its switches.
     Homing,
-    /// What lies under the finger.
+    /// To identify the texture under the finger.
     Identify,
     /// To learn a texture.
     Train,
@@ -84,7 +84,7 @@ impl Activity {
         Self::Idle,
     ];
 
-    /// How long it takes, about, ms.
+    /// Its usual duration, ms.
     pub fn takes_ms(self) -> u64 {
         match self {
             Self::Homing => 6_000,
@@ -95,16 +95,16 @@ impl Activity {
     }
 }
 
-/// What happens in a case.
+/// The events of a case.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Case {
     /// The seed that all of it is drawn from.
     pub seed: u64,
     /// Number of the texture under the finger.
     pub texture: u8,
-    /// What the probe is asked for.
+    /// The request to the probe.
     pub activity: Activity,
-    /// What breaks, and how long after that, ms.
+    /// The faults, and their times after that, ms.
     pub faults: Vec<(u64, Fault)>,
     /// Bits of the flash that change while the power is off.
     pub bits: Vec<usize>,
@@ -112,8 +112,8 @@ pub struct Case {
     pub stiff: bool,
 }
 
-/// Whether what the fault says that the user does frees a finger that still presses: where the rig cannot lift it, by the lever's
-/// knob or because the stop has taken the supply.
+/// Returns true if the user's remedy for the fault frees a finger that still presses: where the rig cannot lift it, by
+/// the lever's knob or because the stop has taken the supply.
 pub fn frees_the_finger(named: Named) -> bool {
     named == Named::EStop || named.recovery().contains("knob")
 }
@@ -142,7 +142,7 @@ impl Case {
         }
     }
 
-    /// An exploration of what lies under the finger.
+    /// An exploration of the texture under the finger.
     pub fn identify(&self) -> Identify {
         Identify {
             seed: self.seed as u32,
@@ -150,7 +150,7 @@ impl Case {
         }
     }
 
-    /// What the probe is sent, one after the other.
+    /// The commands to the probe, one after the other.
     pub fn commands(&self) -> Vec<Command> {
         let name = || "a new one".try_into().unwrap_or_default();
         match self.activity {
@@ -169,20 +169,20 @@ impl Case {
     }
 }
 
-/// What became of a case.
+/// The result of a case.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outcome {
-    /// What happened.
+    /// The case.
     pub case: Case,
     /// Largest force on the finger until the end of the request, N.
     pub force_max_n: f64,
-    /// Why the request was not done.
+    /// The reason why the request was not done.
     pub refused: Option<String>,
     /// The faults that the rig named.
     pub named: Vec<Named>,
-    /// How well they fit what broke.
+    /// Their fit to the injected faults.
     pub naming: Naming,
-    /// What is not as it must be.
+    /// Violated conditions.
     pub wrong: Vec<String>,
     /// Virtual time.
     pub took: Duration,
@@ -211,17 +211,17 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// What is heard of the probe.
+/// The probe's messages so far.
 #[derive(Default)]
-struct Heard {
+struct HostLog {
     named: Vec<Named>,
-    /// When the first one was.
+    /// Time of the first one.
     first_ns: Option<u64>,
     learned: bool,
     troubles: Vec<Failure>,
 }
 
-impl Host for Heard {
+impl Host for HostLog {
     fn tell(&mut self, event: Event) {
         match event {
             Event::TextureLearned(_) => self.learned = true,
@@ -240,7 +240,7 @@ impl Host for Heard {
     }
 }
 
-/// Why a case came to nothing.
+/// Reasons why a case could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
     /// The rig, before anything broke.
@@ -251,7 +251,7 @@ pub enum CaseError {
     Store(#[from] StoreError),
 }
 
-/// What all cases begin with.
+/// The common beginning of all cases.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench<'t> {
     /// The table that comes with the firmware.
@@ -278,7 +278,7 @@ impl<'t> Bench<'t> {
         })
     }
 
-    /// Has a case happen.
+    /// Runs a case.
     ///
     /// # Errors
     /// See [`CaseError`].
@@ -292,7 +292,7 @@ impl<'t> Bench<'t> {
             .calibrate(self.calibration)
             .map_err(SimError::from)?;
         rig.home()?;
-        let (host, plan) = (RefCell::new(Heard::default()), dsp::Plan::new());
+        let (host, plan) = (RefCell::new(HostLog::default()), dsp::Plan::new());
         let mut buffer = vec![0; TABLE];
         let blank = RamFlash::blank();
         let mut probe = switch_on(rig, blank, self.factory, &mut buffer, &plan, &host)?;
@@ -308,7 +308,7 @@ impl<'t> Bench<'t> {
         }
         let before = Kept::of(&mut probe);
         let asked = ask(&mut probe, case);
-        // what was to break breaks
+        // the scheduled faults happen in any case
         let ends_ns = began_ns + case.activity.takes_ms() * 1_000_000;
         while now_ns(&mut probe) < ends_ns {
             probe.rig.servo.tick();
@@ -346,12 +346,12 @@ impl<'t> Bench<'t> {
     /// The power is off for a moment, in which bits of the flash change.
     fn restarted<'p>(
         &self,
-        probe: SimProbe<'p, Heard>,
+        probe: SimProbe<'p, HostLog>,
         case: &Case,
-        host: &RefCell<Heard>,
+        host: &RefCell<HostLog>,
         before: &Kept,
         wrong: &mut Vec<String>,
-    ) -> Result<SimProbe<'p, Heard>, StoreError>
+    ) -> Result<SimProbe<'p, HostLog>, StoreError>
     where
         't: 'p,
     {
@@ -369,7 +369,7 @@ impl<'t> Bench<'t> {
     }
 }
 
-/// What a probe keeps without power.
+/// The data that a probe keeps without power.
 #[derive(PartialEq)]
 struct Kept {
     table: Vec<u8>,
@@ -378,7 +378,7 @@ struct Kept {
 }
 
 impl Kept {
-    fn of(probe: &mut SimProbe<'_, Heard>) -> Self {
+    fn of(probe: &mut SimProbe<'_, HostLog>) -> Self {
         let table = probe.memory.in_force().to_vec();
         let store = probe.memory.store().ok();
         let (calibration, false_alarm) = store.map_or((None, None), |store| {
@@ -392,7 +392,7 @@ impl Kept {
         }
     }
 
-    /// What is other than before, but for what the request may change: the table, the calibration.
+    /// The differences from before, except for those that the request may make: the table, the calibration.
     fn lost(&self, before: &Self, (table, calibration): (bool, bool)) -> Vec<String> {
         [
             (!table && self.table != before.table, "table"),
@@ -412,23 +412,27 @@ impl Kept {
     }
 }
 
-fn now_ns(probe: &mut SimProbe<'_, Heard>) -> u64 {
+fn now_ns(probe: &mut SimProbe<'_, HostLog>) -> u64 {
     probe.rig.servo.rig().now().as_nanos() as u64
 }
 
-/// Asks the probe for something; why it was not done, in its words.
-fn send(probe: &mut SimProbe<'_, Heard>, command: Command) -> Result<(), String> {
-    block_on(probe.perform::<Plain>(&command)).map_err(|why| why.to_string())
+/// Sends the probe a command; returns the reason why it was not done, in its words.
+fn send(probe: &mut SimProbe<'_, HostLog>, command: Command) -> Result<(), String> {
+    block_on(probe.perform(&command)).map_err(|why| why.to_string())
 }
 
-fn ask(probe: &mut SimProbe<'_, Heard>, case: &Case) -> Result<(), String> {
+fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {
     case.commands()
         .into_iter()
         .try_for_each(|command| send(probe, command))
 }
 
 /// The rig comes to rest, with its motors off and its finger lifted; the largest force until then, N.
-fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<String>) -> f64 {
+fn rest(
+    probe: &mut SimProbe<'_, HostLog>,
+    host: &RefCell<HostLog>,
+    wrong: &mut Vec<String>,
+) -> f64 {
     let servo = &mut probe.rig.servo;
     let ends = servo.rig().now() + Duration::from_secs(REST_S);
     // a lever that nothing drives is at rest, too, while it runs down
@@ -464,9 +468,9 @@ fn rest(probe: &mut SimProbe<'_, Heard>, host: &RefCell<Heard>, wrong: &mut Vec<
     truth.force_max_n
 }
 
-/// Everything is repaired: the rig homes, and does what it is asked for.
+/// Everything is repaired: the rig homes, and carries out a request.
 fn repaired(
-    probe: &mut SimProbe<'_, Heard>,
+    probe: &mut SimProbe<'_, HostLog>,
     case: &Case,
     calibrated: bool,
     wrong: &mut Vec<String>,

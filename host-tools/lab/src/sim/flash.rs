@@ -10,11 +10,11 @@ pub const SECTOR: usize = 16 * 1024;
 /// Bytes of the longest table: for buffers.
 pub const TABLE: usize = Store::<RamFlash>::MAX_TABLE;
 
-/// The sectors of a store, the smallest of `S` bytes. They obey the rules: words are read and written whole, sectors are
-/// erased whole, and writing only clears bits.
+/// The sectors of a store, the smallest of `S` bytes. They obey the rules: words are read and written whole, sectors
+/// are erased whole, and writing only clears bits.
 #[derive(Clone, Debug)]
 pub struct RamFlash<const S: usize = SECTOR> {
-    /// What they hold.
+    /// Their contents.
     pub bytes: Vec<u8>,
     /// Sectors that were erased so far.
     pub erases: u32,

@@ -1,9 +1,9 @@
-//! The handheld probe in the simulated world: a hand that does what the display says, and the table that is learned from it.
+//! The handheld probe in the simulated world: a hand that follows the display, and the table that is learned from it.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::features::Observation;
 use tactus_core::handheld::guidance::{Again, Event};
@@ -25,12 +25,12 @@ use tactus_world::world::{Setup, Truth, World};
 const READING_SLOTS: u64 = SLOTS_HZ as u64 / 100;
 /// From the sound to the slide, s (chosen).
 const REACTION_S: (f64, f64) = (0.2, 0.5);
-/// How long a person slides, s: until the bar is full, and a little more.
+/// Duration of a person's slide, s: until the bar is full, and a little more.
 const SLIDE_S: f64 = 1.8;
 /// Attempts that a person makes before giving up on a texture.
 const ATTEMPTS: u32 = 10;
 
-/// Why no slide over a texture was good.
+/// Reasons why no slide over a texture was good.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HandError {
     /// One attempt after the other was no good.
@@ -41,12 +41,12 @@ pub enum HandError {
     NoGoodSlide {
         /// Number of the texture in Table 1.
         texture: u8,
-        /// What the last slide was; `None` if none was noticed.
+        /// Fault of the last slide; `None` if none was noticed.
         why: Option<Again>,
     },
 }
 
-/// A texture as an optical sensor of motion at this height sees it: nothing of glass and of what is polished (chosen).
+/// A texture as an optical sensor of motion at this height sees it: no surface for glass and polished ones (chosen).
 pub fn ground(texture: u8, height_mm: f64) -> Ground {
     let name = texture_name(texture).to_lowercase();
     if name.contains("glass") || name.contains("polished") {
@@ -68,7 +68,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Somebody who holds the probe over the texture of `setup`.
+    /// A person who holds the probe over the texture of `setup`.
     pub fn new(setup: Setup, manner: Manner) -> Self {
         let mut world = World::new(setup);
         world.hold(Hand::new(setup.trial_seed, manner));
@@ -107,14 +107,14 @@ impl Person {
             })
     }
 
-    /// What the hand means to do from now on.
+    /// Sets the intention of the hand.
     pub fn intend(&mut self, force_n: f64, pace_mm_s: f64) {
         if let Some(hand) = self.world.hand() {
             hand.intend(force_n, pace_mm_s);
         }
     }
 
-    /// What is really so.
+    /// The ground truth.
     pub fn truth(&self) -> Truth {
         self.world.truth()
     }
@@ -127,7 +127,7 @@ impl Person {
     /// Lets so much time pass; the first event for which `until` holds ends it.
     fn run_until(
         &mut self,
-        touch: &mut Touch<'_, Plain>,
+        touch: &mut Touch<'_>,
         seconds: f64,
         until: impl Fn(&Event) -> bool,
     ) -> Option<Event> {
@@ -147,8 +147,8 @@ impl Person {
         None
     }
 
-    /// Presses and slides as one is asked to: the slide, or what was wrong with it; `None` if nothing was noticed.
-    pub fn slide(&mut self, touch: &mut Touch<'_, Plain>) -> Option<Result<Observation, Again>> {
+    /// Presses and slides as the probe prompts: returns the slide, or its fault; `None` if nothing was noticed.
+    pub fn slide(&mut self, touch: &mut Touch<'_>) -> Option<Result<Observation, Again>> {
         let target_n = f64::from(<(u16, u32)>::from(MOVEMENT).0) * 1e-3;
         let pace_mm_s = f64::from(<(u16, u32)>::from(MOVEMENT).1) * 1e-3;
         let force_n = target_n * exp(self.manner.force_spread * self.normal());
@@ -180,7 +180,7 @@ impl Person {
     }
 }
 
-/// So many good slides of a texture by one person, and how many others there were.
+/// So many good slides of a texture by one person, and the number of other ones.
 ///
 /// # Errors
 /// See [`HandError`].
@@ -190,7 +190,7 @@ pub fn slides(
     wanted: u32,
 ) -> Result<(Vec<Observation>, u32), HandError> {
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     let mut person = Person::new(setup, manner);
     touch.calibrate(person.reader.model().calibration.force_mn_per_count);
     person.run_until(&mut touch, 0.5, |event| *event == Event::Zeroed);
@@ -262,8 +262,8 @@ pub fn learn_with(
 mod tests {
     use super::*;
     use crate::sim::collection::texture_number;
-    use tactus_core::handheld::{ASK_AFTER, MAX_SLIDES, judge_at_most};
-    use tactus_core::table::{Table, factory};
+    use tactus_core::handheld::{ASK_AFTER, judge_at_most};
+    use tactus_core::table::Table;
 
     fn world(among: u8) -> Collection {
         Collection {
@@ -290,7 +290,7 @@ mod tests {
             let mut judged = (1..=ASK_AFTER).map(|n| {
                 (
                     n,
-                    judge_at_most::<Plain>(table, &measured[..n], None, None, ASK_AFTER)
+                    judge_at_most(table, &measured[..n], None, None, ASK_AFTER)
                         .unwrap()
                         .0,
                 )
@@ -357,7 +357,7 @@ mod tests {
                 let (good, _) = slides(world.setup(texture, seed), LEVEL, 1).unwrap();
                 good.first().unwrap().pace
             };
-            // 3 %: what has not come up to speed, frames, counts
+            // 3 %: the part before full speed, frames, counts
             let measured = pace(burlap).unwrap();
             assert!(measured.abs() < 31, "{seed}: {measured}");
             assert_eq!(pace(glass), None, "{seed}");
@@ -370,7 +370,7 @@ mod tests {
         let burlap = texture_number("burlap").unwrap();
         let plan = Plan::new();
         for trial in 100..108 {
-            let mut touch = Touch::<Plain>::new(&plan);
+            let mut touch = Touch::new(&plan);
             let mut person = Person::new(world(1).setup(burlap, trial), Manner::default());
             person.intend(0.5, 0.0);
             let still = person.run_until(&mut touch, 5.0, |event| *event == Event::Still);
@@ -381,125 +381,6 @@ mod tests {
             person.intend(0.5, 8.0);
             let over = person.run_until(&mut touch, 2.0, |_| true);
             assert_eq!(over, Some(Event::Again(Again::TooUneven)), "{trial}");
-        }
-    }
-
-    #[test]
-    #[ignore = "the book's figures; a minute"]
-    fn all_textures_of_the_world() {
-        let collection = Collection {
-            textures: (1..=117).collect(),
-            // as the factory's table
-            trials: 15,
-            ..world(1)
-        };
-        let measured: Vec<_> = collection
-            .textures
-            .par_iter()
-            .map(|&t| (t, slides(collection.setup(t, 0), Manner::default(), 5)))
-            .collect();
-        let bad: u32 = measured
-            .iter()
-            .filter_map(|(_, r)| r.as_ref().ok())
-            .map(|r| r.1)
-            .sum();
-        eprintln!("{bad} slides rejected");
-        let (table, left_out) = learn_with(FingerName::Biotac, &collection, || ()).unwrap();
-        eprintln!("no good slide: {left_out:?}; {} bytes", table.len());
-        explore(&collection, &table);
-        // none of another world's textures is known
-        let other = Collection {
-            seed: 2,
-            ..collection
-        };
-        let read = Table::read(&table).unwrap();
-        let [mut all, mut new, mut taken] = [0; 3];
-        for &texture in &other.textures {
-            let Ok((measured, _)) = slides(other.setup(texture, 1), Manner::default(), 5) else {
-                continue;
-            };
-            let mut judged = (1..=ASK_AFTER).map(|n| {
-                judge_at_most::<Plain>(read, &measured[..n], None, None, ASK_AFTER)
-                    .unwrap()
-                    .0
-            });
-            let judged = judged.find(|judged| !judged.open).unwrap();
-            all += 1;
-            new += usize::from(judged.unknown);
-            taken += usize::from(judged.sure);
-        }
-        let unsure = all - new - taken;
-        eprintln!("{all} of another world: unknown {new}, unsure {unsure}, taken for one {taken}");
-    }
-
-    /// Slides of a touch in [`what_more_slides_tell`].
-    const MOST: usize = 12;
-
-    /// Explores touches that the factory's table of a finger was not learned from: how many, and of how many, after 1 to [`MOST`] slides, the right
-    /// texture is sure, another one is, and none is said to fit.
-    fn explore_factory(
-        finger: FingerName,
-        trials: std::ops::Range<u64>,
-    ) -> (usize, Vec<[usize; 3]>) {
-        let table = Table::read(factory::handheld(finger)).unwrap();
-        let world = world(117);
-        let touches: Vec<_> = (1..=117)
-            .filter_map(|texture| Some((texture, table.find(texture_name(texture))?)))
-            .flat_map(|known| trials.clone().map(move |trial| (known, trial)))
-            .collect();
-        let ended: Vec<_> = touches
-            .par_iter()
-            .filter_map(|&((texture, is), trial)| {
-                let setup = world.setup_with(finger, texture, trial);
-                // nearly too smooth to be noticed
-                let (measured, _) = slides(setup, Manner::default(), MOST as u32).ok()?;
-                let mut judged = (1..=MOST).map(|n| {
-                    let judged = judge_at_most::<Plain>(table, &measured[..n], None, None, MOST);
-                    (n, judged.unwrap().0)
-                });
-                let (n, last) = judged.find(|(_, judged)| !judged.open).unwrap();
-                Some((n, last.leading[0].0 == is, last))
-            })
-            .collect();
-        let counts = (1..=MOST).map(|most| {
-            let mut counts = [0; 3];
-            for (_, right, last) in ended.iter().filter(|(n, ..)| *n <= most) {
-                let outcome = match (last.unknown, last.sure, right) {
-                    (true, ..) => 2,
-                    (_, true, true) => 0,
-                    (_, true, false) => 1,
-                    _ => continue,
-                };
-                counts[outcome] += 1;
-            }
-            counts
-        });
-        (ended.len(), counts.collect())
-    }
-
-    #[test]
-    #[ignore = "the book's figures; minutes"]
-    fn what_more_slides_tell() {
-        for finger in FingerName::ALL {
-            let (all, counts) = explore_factory(finger, 100..102);
-            for ([right, wrong, unknown], n) in counts.iter().zip(1..) {
-                println!(
-                    "{finger}, at most {n}: right {right}, wrong {wrong}, unknown {unknown} of {all}"
-                );
-            }
-            let after = |slides: usize| counts[slides - 1];
-            let [asked, last, more] = [ASK_AFTER, MAX_SLIDES, MOST].map(after);
-            // of a hundred: going on tells five more, and none of them wrong
-            assert!(
-                100 * (last[0] - asked[0]) >= 5 * all,
-                "{finger}: {counts:?}"
-            );
-            assert!(
-                last[1] <= asked[1] + all / 100 && last[1] <= 2,
-                "{finger}: {counts:?}"
-            );
-            // and more than that tells two more at most
-            assert!(100 * (more[0] - last[0]) <= 2 * all, "{finger}: {counts:?}");
         }
     }
 }

@@ -17,7 +17,7 @@ use tactus_world::slot::Reader;
 use tactus_world::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
-/// The probe says its force so often, ms.
+/// Interval at which the probe sends its force, ms.
 const SAYS_MS: u64 = 10;
 
 /// A rig that an arm moves.
@@ -77,7 +77,7 @@ impl ArmRig {
         &mut self.world
     }
 
-    /// What runs on the arm.
+    /// The program on the arm.
     pub fn program(&mut self) -> &mut ArmProgram {
         &mut self.program
     }
@@ -92,12 +92,12 @@ impl ArmRig {
         Duration::from_nanos(self.now_ns)
     }
 
-    /// Whether the line of permission has fallen so far.
+    /// Returns true if the line of permission has fallen so far.
     pub fn lost_permission(&self) -> bool {
         self.lost_permission
     }
 
-    /// What the rig is doing, as a probe shows it.
+    /// State of the rig, as a probe shows it.
     pub fn state(&mut self, ended: Option<Ended>) -> RigState {
         RigState::over_link(&mut self.rig, ended)
     }

@@ -1,5 +1,5 @@
-//! A campaign of presses: worlds, the whole grid of movements, ten textures of each world, and P_DC sound, dead, dying and
-//! leaking. Judged is the world's own force.
+//! A campaign of presses: worlds, the whole grid of movements, ten textures of each world, and P_DC sound, dead, dying
+//! and leaking. It checks the world's own force.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -19,17 +19,17 @@ use tactus_world::noise::Noise;
 use tactus_world::textures;
 use tactus_world::world::Setup;
 
-/// The finger never feels more than this, N.
+/// Largest force that the finger ever bears, N.
 pub const FORCE_LIMIT_N: f64 = 2.2;
 /// Textures of each world: the softest, the stiffest, and others by its seed.
 const TEXTURES: usize = 10;
 /// Stream of the seeds that a campaign draws from.
 const STREAM: u64 = 0x9e55;
-/// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Within 0.05 s it shows contact in neither
-/// signal, as the book's page of limits says.
+/// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Within 0.05 s it shows contact in
+/// neither signal, as the book's page of limits says.
 const LEAK_S: (f64, f64) = (0.1, 50.0);
 
-/// What is wrong with P_DC.
+/// Faults of P_DC.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Trouble {
     /// Nothing.
@@ -76,11 +76,11 @@ pub struct Bench {
     pub world: u64,
     /// Number of the texture.
     pub texture: u8,
-    /// What is wrong.
+    /// The fault.
     pub trouble: Trouble,
     /// Guards that are switched off.
     pub unguarded: Unguarded,
-    /// What the finger is fixed to.
+    /// The finger's mount.
     pub mount: Mount,
 }
 
@@ -93,16 +93,16 @@ pub struct Press {
     pub seed: u64,
     /// The movement.
     pub movement: Movement,
-    /// What broke, and at which share of the movement's force.
+    /// The fault, and its share of the movement's force.
     pub cause: Option<(Cause, f64)>,
     /// Largest force by the world's own reckoning, until the finger was lifted, N.
     pub force_max_n: f64,
-    /// How the movement ended.
+    /// The end of the movement.
     pub ended: Result<Ended, SimError>,
 }
 
 impl Press {
-    /// Whether the finger felt too much.
+    /// Returns true if the finger bore too much force.
     pub fn is_too_hard(&self) -> bool {
         self.force_max_n > FORCE_LIMIT_N
     }
@@ -133,7 +133,7 @@ impl fmt::Display for Press {
     }
 }
 
-/// Which rigs are run.
+/// The rigs to run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Campaign {
     /// Seeds of the worlds.
@@ -164,7 +164,7 @@ impl Campaign {
         benches.into_iter().step_by(self.every.max(1)).collect()
     }
 
-    /// Makes all presses, rigs side by side; `done` hears of each rig.
+    /// Makes all presses, rigs side by side; `done` is called after each rig.
     pub fn run(&self, done: impl Fn() + Sync) -> Vec<Press> {
         let presses = self.benches().into_par_iter().flat_map_iter(|bench| {
             let presses = bench.run();

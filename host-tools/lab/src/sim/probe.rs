@@ -19,39 +19,39 @@ use super::flash::RamFlash;
 use super::over_link::ArmRig;
 use super::rig::SimRig;
 
-/// Who is at the other end of a simulated probe.
+/// The other end of a simulated probe.
 pub trait Host {
-    /// The probe says this.
+    /// Takes an event of the probe.
     fn tell(&mut self, event: Event);
 
-    /// This table is in force now.
+    /// Takes the table that is in force now.
     fn table(&mut self, _table: TableInUse) {}
 
-    /// The go / no-go output is so from now on.
+    /// Takes the level of the go / no-go output.
     fn go(&mut self, _on: bool) {}
 
-    /// It is `now` by the rig's clock, and this is its state: heard a thousand times a second.
+    /// Takes the time by the rig's clock, and its state: called a thousand times a second.
     fn tick(&mut self, _now: Duration, _rig: &RigState) {}
 
     /// Our rig before each millisecond, for a host that looks at its world or changes it.
     fn look(&mut self, _rig: &mut SimRig) {}
 
-    /// Whether time stands still: what waits for the rig waits on, until it is polled again and this says no.
+    /// Returns true if time stands still: tasks that wait for the rig keep waiting until a later poll finds false.
     fn pauses(&self) -> bool {
         false
     }
 
-    /// Whether the rig is to be stopped in this millisecond.
+    /// Returns true if the rig is to be stopped in this millisecond.
     fn stops(&mut self) -> bool {
         false
     }
 
-    /// Whether nothing further of the request is to begin.
+    /// Returns true if no further part of the request may begin.
     fn is_stopped(&self) -> bool {
         false
     }
 
-    /// Whether raw samples are wanted.
+    /// Returns true if raw samples are wanted.
     fn streams(&self) -> bool {
         false
     }
@@ -65,25 +65,25 @@ pub trait Driven {
     /// A millisecond passes.
     fn tick(&mut self) -> &Outputs;
 
-    /// How the last movement ended, told once.
+    /// Takes the end of the last movement; `None` the second time.
     fn take_ended(&mut self) -> Option<Ended>;
 
-    /// What it is doing, as a probe shows it.
+    /// Its state, as a probe shows it.
     fn state(&mut self, ended: Option<Ended>) -> RigState;
 
     /// Virtual time since power-up.
     fn now(&self) -> Duration;
 
-    /// Has it do something.
+    /// Gives it a command.
     ///
     /// # Errors
     /// It refuses that.
     fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
 
-    /// Stops what is being done.
+    /// Stops the command.
     fn stop(&mut self);
 
-    /// No more of the slide is needed.
+    /// Ends the slide early.
     fn end_slide(&mut self) {}
 
     /// See [`Servo::gravity`].
@@ -163,7 +163,7 @@ impl Driven for ArmRig {
     }
 }
 
-/// The servo of a simulated rig: virtual time passes while somebody waits for it.
+/// The servo of a simulated rig: virtual time passes while a task waits for it.
 pub struct SimServo<'p, H, R = SimRig> {
     rig: R,
     host: &'p RefCell<H>,
@@ -280,10 +280,10 @@ impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
     }
 }
 
-/// Tells the host.
-pub struct Told<'p, H>(&'p RefCell<H>);
+/// Passes events to the host.
+pub struct HostSink<'p, H>(&'p RefCell<H>);
 
-impl<H: Host> Events for Told<'_, H> {
+impl<H: Host> Events for HostSink<'_, H> {
     fn tell(&mut self, event: Event) {
         self.0.borrow_mut().tell(event);
     }
@@ -299,13 +299,13 @@ impl<H: Host> Events for Told<'_, H> {
 
 /// A simulated probe.
 pub type SimProbe<'p, H, R = SimRig> =
-    Probe<'p, ServoRig<SimServo<'p, H, R>>, RamFlash, TableCopy, Told<'p, H>>;
+    Probe<'p, ServoRig<SimServo<'p, H, R>>, RamFlash, TableCopy, HostSink<'p, H>>;
 
-/// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table that
-/// comes with the firmware. `buffer` takes the longest table.
+/// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table
+/// that comes with the firmware. `buffer` takes the longest table.
 ///
 /// # Errors
-/// The flash has no room for a store. Of what else is wrong with it the host is told, as by the firmware.
+/// The flash is too small for a store. Other faults in it are reported to the host, as by the firmware.
 pub fn switch_on<'p, H: Host, R: Driven>(
     rig: R,
     flash: RamFlash,
@@ -327,14 +327,14 @@ pub fn switch_on<'p, H: Host, R: Driven>(
     let mut probe = Probe {
         rig,
         memory: Memory::new(Ok(store), TableCopy::default(), factory, buffer),
-        events: Told(host),
+        events: HostSink(host),
         plan,
     };
     block_on(probe.memory.reload(&mut probe.events));
     Ok(probe)
 }
 
-/// Takes the power from a probe for a moment: only what its flash holds is left. Its rig stays as it is.
+/// Takes the power from a probe for a moment: it keeps the contents of its flash only. Its rig stays as it is.
 ///
 /// # Errors
 /// See [`switch_on`].

@@ -1,4 +1,5 @@
-//! Recorded slides of real textures, played on the simulated rig: see [`World::play`](tactus_world::world::World::play).
+//! Recorded slides of real textures, played on the simulated rig: see
+//! [`World::play`](tactus_world::world::World::play).
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -19,7 +20,7 @@ use crate::sim::rig::SimRig;
 use tactus_world::played::{Played, SHEAR_HZ};
 use tactus_world::world::Setup;
 
-/// Why recordings cannot be played.
+/// Reasons why recordings cannot be played.
 #[derive(Debug, thiserror::Error)]
 pub enum PlayError {
     /// They cannot be read.
@@ -35,10 +36,10 @@ pub enum PlayError {
         /// Number of the slide.
         number: u32,
     },
-    /// Slides of other movements cannot be told apart while they are played.
+    /// Slides of other movements look the same while they are played.
     #[error("the recordings are of {}; play those of one movement", count(*.0 as u64, "movement"))]
     Movements(usize),
-    /// Nothing is left to learn from or to be tested with.
+    /// No slide is left to learn from or to test with.
     #[error(
         "{texture} has {}; learning from {train} takes 2 or more, and one must be left", count(*there as u64, "slide")
     )]

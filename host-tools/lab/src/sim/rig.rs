@@ -1,13 +1,12 @@
-//! The simulated rig: the world of [`tactus_world`] at one end of the pins, the core's [`Control`] at the other, and what the
-//! board's timers do in between, in virtual time.
+//! The simulated rig: the world of [`tactus_world`] at one end of the pins, the core's [`Control`] at the other, and
+//! the work of the board's timers in between, in virtual time.
 
 use std::time::Duration;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus_core::dsp::Kernels;
 use tactus_core::features::{Blocks, Movement, PropertySet, SamplePhase, Slide};
-use tactus_core::probe::{RigState, Watch};
+use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::{RigCalibration, RigCalibrationError};
 use tactus_core::rig::control::Control;
 use tactus_core::rig::guard::Unguarded;
@@ -18,7 +17,6 @@ use tactus_core::rig::{Ended, Enough, Fault, MAX_REJECTED, Phase, Refused, Rig, 
 use tactus_core::sensor::biotac;
 use tactus_core::sensor::pressure::{Channel, Pressure, RATE_HZ, SLOTS_HZ};
 use tactus_core::sensor::slot::Unexpected;
-use tactus_core::wire::Event;
 
 use crate::data::recording::Recording;
 use tactus_world::conditions::Conditions;
@@ -36,7 +34,7 @@ fn amperes(adc: u16) -> f32 {
     (f32::from(adc) - 2048.0) * (3.3 / 4096.0)
 }
 
-/// Why the simulated rig did not make a movement.
+/// Reasons why the simulated rig did not make a movement.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// It was refused.
@@ -48,13 +46,13 @@ pub enum SimError {
     /// It was stopped.
     #[error("stopped")]
     Stopped,
-    /// Nothing came of it in two minutes of virtual time.
+    /// It did not end in two minutes of virtual time.
     #[error("the rig hangs in {0:?}")]
     Hangs(Phase),
-    /// A calibration came to nothing.
+    /// A calibration failed.
     #[error(transparent)]
     Calibration(#[from] RigCalibrationError),
-    /// The sensor does not say what it is.
+    /// The sensor does not identify itself.
     #[error(transparent)]
     Sensor(#[from] biotac::PropertyError),
     /// A part of the finger does not start.
@@ -83,13 +81,9 @@ pub struct SimRig {
     /// P_DC words of the last tick.
     pdc: Vec<u16>,
     performed: Vec<Performed>,
-    listener: Option<(Watch, Listener)>,
 }
 
-/// Hears what a probe with this rig would report of a slide, with the time in ms.
-pub type Listener = Box<dyn FnMut(u32, Event) + Send>;
-
-/// How a slide was really made: the world's truth, which the control does not know.
+/// The ground truth of a slide, which the control does not know.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Performed {
     /// Contact force when the slide began, N.
@@ -98,7 +92,7 @@ pub struct Performed {
     pub force_max_n: f64,
     /// Mean speed of the steady part, mm/s.
     pub speed_mm_s: f64,
-    /// How long that was, s.
+    /// Duration of that, s.
     pub steady_s: f64,
     /// Largest relative deviation of the mean speed of any 100 ms of the steady part.
     pub speed_error: f64,
@@ -149,23 +143,12 @@ impl SimRig {
             current_a: 0.0,
             pdc: Vec::new(),
             performed: Vec::new(),
-            listener: None,
         }
     }
 
-    /// From now on `listener` hears of every slide: its phases, where the rig is, and the samples.
-    pub fn listen(&mut self, listener: Listener) {
-        self.listener = Some((Watch::default(), listener));
-    }
-
-    /// How every slide so far was really made.
+    /// The ground truth of every slide so far.
     pub fn performed(&self) -> &[Performed] {
         &self.performed
-    }
-
-    /// How every slide was really made since this was asked for last.
-    pub fn take_performed(&mut self) -> Vec<Performed> {
-        std::mem::take(&mut self.performed)
     }
 
     /// Sensor slots since power-up.
@@ -178,7 +161,7 @@ impl SimRig {
         &mut self.world
     }
 
-    /// Gravity along the finger as its decoder says, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
+    /// Gravity along the finger by its decoder, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
     pub fn gravity(&self) -> Option<f32> {
         self.reader.gravity()
     }
@@ -188,7 +171,7 @@ impl SimRig {
         &mut self.control
     }
 
-    /// What the rig is doing, as a probe shows it; how the last movement ended is for the caller to remember.
+    /// State of the rig, as a probe shows it; the caller remembers the end of the last movement.
     pub fn state(&mut self, ended: Option<Ended>) -> RigState {
         RigState::of(&mut self.control, self.steps, self.current_a, ended)
     }
@@ -203,7 +186,7 @@ impl SimRig {
         &self.pdc
     }
 
-    /// What the control last set the pins to.
+    /// The last outputs of the control.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
@@ -266,7 +249,7 @@ impl SimRig {
         &self.outputs
     }
 
-    /// When the next slot is due, from a timer of 4400 Hz: no drift, and no overflow.
+    /// Time of the next slot, from a timer of 4400 Hz: no drift, and no overflow.
     fn slot_ns(&self) -> u64 {
         let hz = u64::from(SLOTS_HZ);
         let (seconds, slot) = (self.slot / hz, self.slot % hz);
@@ -314,7 +297,7 @@ impl SimRig {
         }
     }
 
-    /// Lets the rig go on until it is at rest: ready, parked or faulted with the finger off the sample.
+    /// Runs the rig until it is at rest: ready, parked or faulted with the finger off the sample.
     ///
     /// # Errors
     /// The fault that it came to, or that it never came to rest.
@@ -375,8 +358,8 @@ impl SimRig {
         Ok(())
     }
 
-    /// Makes one movement, beginning at `start` (0 to 1 of the room that the sample leaves); `each` sees what every tick
-    /// set the pins to.
+    /// Makes one movement, beginning at `start` (0 to 1 of the length that the sample leaves); `each` gets the outputs
+    /// of every tick.
     ///
     /// # Errors
     /// See [`SimError`]. The stage stands then, and the finger is lifted.
@@ -392,7 +375,7 @@ impl SimRig {
         })
     }
 
-    /// As [`SimRig::slide`]; the slide ends early when `each` says so.
+    /// As [`SimRig::slide`]; the slide ends early when `each` returns so.
     fn slide_until(
         &mut self,
         movement: Movement,
@@ -408,13 +391,6 @@ impl SimRig {
             self.tick();
             if each(&self.outputs, &self.pdc) {
                 self.control.end_slide();
-            }
-            let now_ms = self.now_ns / TICK_NS;
-            if now_ms.is_multiple_of(Watch::EVERY_MS) && self.listener.is_some() {
-                let state = self.state(None);
-                if let Some((watch, listener)) = &mut self.listener {
-                    watch.look(&state, |event| listener(now_ms as u32, event));
-                }
             }
             let now = self.world.truth();
             truth.force_max_n = now.force_max_n;
@@ -454,8 +430,8 @@ impl SimRig {
         }
     }
 
-    /// Makes one movement and records it; a slide with a gap is repeated, and one that failed in a way that the rig gets over
-    /// by itself. Texture and number are left at 0.
+    /// Makes one movement and records it; repeats a slide with a gap, and one that failed with an error that the rig
+    /// recovers from by itself. Texture and number are left at 0.
     ///
     /// # Errors
     /// See [`SimError`].
@@ -489,7 +465,7 @@ impl SimRig {
         Err(failed)
     }
 
-    /// Whether the rig can go on after this failure; it has homed then, if it had to.
+    /// Returns true if the rig can continue after this failure; it has homed then, if it had to.
     fn go_on(&mut self, failed: &SimError) -> bool {
         match *failed {
             SimError::Refused(why) => RigError::from(why).is_of_the_movement(),
@@ -508,41 +484,33 @@ impl Rig for SimRig {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), SimError> {
         self.perform_until(slide, &mut |_| false).await
     }
 
-    async fn perform_until<K: Kernels>(
+    async fn perform_until(
         &mut self,
-        slide: &mut Slide<'_, K>,
-        enough: Enough<'_, K>,
+        slide: &mut Slide<'_>,
+        enough: Enough<'_>,
     ) -> Result<(), SimError> {
         if self.control.phase() == Phase::Parked {
             self.home()?;
         }
         let start = self.random.random();
-        let (mut blocks, mut taken) = (Blocks::default(), Vec::new());
-        let listens = self.listener.is_some();
+        let mut blocks = Blocks::default();
         let mut over = false;
         let ended = self.slide_until(slide.movement(), start, |outputs, _| {
             let (phase, pac) = (&outputs.sample_phase, &outputs.pac);
             let Some(block) = blocks.put(phase, pac, outputs.shear_mn) else {
                 return false;
             };
-            let goes_on = !over;
-            if goes_on {
-                slide.take(&block);
-                over = !block.still && enough(slide);
+            if over {
+                return false;
             }
-            taken.extend(listens.then_some(block));
-            goes_on && over
+            slide.take(&block);
+            over = !block.still && enough(slide);
+            over
         })?;
-        if let Some((_, listener)) = &mut self.listener {
-            let now_ms = (self.now_ns / TICK_NS) as u32;
-            for block in taken {
-                listener(now_ms, Event::Block(block));
-            }
-        }
         let lost = match ended {
             Ended::Gap(samples) => samples,
             _ => 0,

@@ -1,8 +1,8 @@
-//! Scenarios for the handheld probe: what a person does, and what must be seen, as files.
+//! Scenarios for the handheld probe as files: a person's actions, and the expected screens.
 //!
-//! A scenario is JSON: the texture under the finger, how the hand is kept, and steps, each of which does one thing
-//! ([`Step`]). Anybody may have written it: what is accepted ([`Scenario::parse`]) can be played, in a time that has an end
-//! ([`Scenario::longest_s`]). The emulated board plays them.
+//! A scenario is JSON: the texture under the finger, the steadiness of the hand, and steps, each of which does one
+//! thing ([`Step`]). The file is not trusted: a scenario that is accepted ([`Scenario::parse`]) can be played, in a
+//! time that has an end ([`Scenario::longest_s`]). The emulated board plays them.
 
 use std::path::{Path, PathBuf};
 
@@ -12,16 +12,16 @@ use crate::sim::collection::{Collection, texture_number};
 use tactus_world::person::Manner;
 use tactus_world::world::Setup;
 
-/// Longest that anything is waited for, s, unless a step says otherwise.
+/// Longest wait of a step, s, unless it gives another.
 pub const TIMEOUT_S: f64 = 8.0;
-/// Limits of what is accepted: bytes of a file, steps, and virtual seconds that they may take.
+/// Limits of a scenario: bytes of a file, steps, and virtual seconds that they may take.
 const MAX_BYTES: u64 = 256 << 10;
 const MAX_STEPS: usize = 1000;
 const MAX_S: f64 = 3600.0;
 /// A finger is not pressed harder, N, or moved faster, mm/s.
 const MAX_FORCE_N: f64 = 10.0;
 const MAX_PACE_MM_S: f64 = 500.0;
-/// Deviations of a hand are no larger than what they deviate from.
+/// Largest relative deviation of a hand.
 const MAX_DEVIATION: f64 = 1.0;
 const MAX_TILT_MM: f64 = 10.0;
 /// Seeds have room for trials behind them.
@@ -33,9 +33,9 @@ const MAX_HZ: u32 = 20_000;
 #[derive(Clone, PartialEq, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// What it shows.
+    /// Subject of the scenario.
     pub about: String,
-    /// What lies under the finger: a texture of Table 1, by name or number.
+    /// The texture under the finger: one of Table 1, by name or number.
     pub texture: String,
     /// The world it is of; the firmware's table is of world 1.
     #[serde(default = "one")]
@@ -43,10 +43,10 @@ pub struct Scenario {
     /// The hand, and all other chance.
     #[serde(default = "one")]
     pub seed: u64,
-    /// How the hand is kept; as a careful adult's unless said.
+    /// The steadiness of the hand; a careful adult's by default.
     #[serde(default)]
     pub hand: Manner,
-    /// What is done and seen, one after the other.
+    /// The steps, in order.
     pub step: Vec<Step>,
 }
 
@@ -54,13 +54,13 @@ fn one() -> u64 {
     1
 }
 
-/// One thing that is done or must be seen.
+/// One action or expectation.
 #[derive(Clone, PartialEq, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Step {
     /// Nothing: a word to the reader.
     Note {
-        /// What it says.
+        /// Its text.
         text: String,
     },
     /// All of this is on the display within so many seconds.
@@ -86,7 +86,7 @@ pub enum Step {
         /// Hz.
         hz: u32,
     },
-    /// The hand means to do this from now on; without force it lifts the finger.
+    /// The hand's intention from now on; without force it lifts the finger.
     Hand {
         /// N.
         force_n: f64,
@@ -111,7 +111,7 @@ pub enum Step {
         pace_mm_s: f64,
         /// At most so many.
         slides: u32,
-        /// How long each is, s.
+        /// Duration of each, s.
         #[serde(default = "explored")]
         seconds: f64,
     },
@@ -119,7 +119,7 @@ pub enum Step {
     Press {
         /// ms; 600 and more is a long press.
         ms: u64,
-        /// How often.
+        /// Number of presses.
         #[serde(default = "once")]
         times: u32,
     },
@@ -159,7 +159,7 @@ fn once() -> u32 {
     1
 }
 
-/// Why a file is no scenario.
+/// Reasons why a file is no scenario.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
@@ -168,27 +168,27 @@ pub enum ScenarioError {
     Read {
         /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// It is none.
+    /// It is invalid.
     #[error("{}: {why}", path.display())]
     Invalid {
         /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         why: InvalidScenario,
     },
 }
 
-/// What is wrong with a scenario.
+/// Faults in a scenario.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InvalidScenario {
     /// It is longer than any.
     #[error("more than {MAX_BYTES} bytes")]
     TooLong,
-    /// It is no JSON, or says what a scenario does not.
+    /// It is no JSON, or has unknown fields.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// No such texture.
@@ -199,20 +199,20 @@ pub enum InvalidScenario {
     Seed {
         /// Which.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         is: u64,
     },
     /// More than there is time for.
     #[error("{0} steps: at most {MAX_STEPS}")]
     Steps(usize),
-    /// A number that nobody can do, or see.
+    /// A number beyond its range.
     #[error("{whose}: {what} is {is}: {low} to {high}")]
     Number {
-        /// Of the hand, or of which step.
+        /// The hand, or the number of the step.
         whose: String,
         /// Which.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         is: f64,
         /// Least.
         low: f64,
@@ -222,7 +222,7 @@ pub enum InvalidScenario {
     /// A step that looks for nothing.
     #[error("step {0} looks for no text")]
     Nothing(usize),
-    /// It takes longer than anybody has.
+    /// It takes too long.
     #[error("it may take {0:.0} s: at most {MAX_S} s")]
     Endless(f64),
 }
@@ -326,7 +326,7 @@ impl Scenario {
 /// Number of a texture of Table 1.
 ///
 /// # Errors
-/// There is none.
+/// There is no such texture.
 pub fn texture(name: &str) -> Result<u8, InvalidScenario> {
     texture_number(name).ok_or_else(|| InvalidScenario::Texture(name.into()))
 }
@@ -426,13 +426,13 @@ impl Step {
         }
     }
 
-    /// From what is seen to what is done, ms.
+    /// Time from a view to the reaction, ms.
     pub const REACTION_MS: u64 = 300;
-    /// How long a slide of [`Step::Explore`] is unless it says so, and how long its verdict is waited for, s.
+    /// Default duration of a slide of [`Step::Explore`], and longest wait for its verdict, s.
     pub const EXPLORED_S: f64 = 1.8;
     /// See [`Step::EXPLORED_S`].
     pub const VERDICT_S: f64 = 1.0;
-    /// From the end of a slide to the finger's being lifted, and from there to the end of the step, s.
+    /// Time from the end of a slide to the lifting of the finger, and from there to the end of the step, s.
     pub const HELD_S: f64 = 0.15;
     /// See [`Step::HELD_S`].
     pub const LIFTED_S: f64 = 0.5;
@@ -440,7 +440,7 @@ impl Step {
     pub const RELEASED_MS: u64 = 100;
 }
 
-/// A slide of so many seconds, with all that is waited for.
+/// Duration of a slide of so many seconds, with all waits.
 fn slide_s(seconds: f64) -> f64 {
     TIMEOUT_S + Step::REACTION_MS as f64 * 1e-3 + seconds + Step::HELD_S + Step::LIFTED_S
 }

@@ -1,7 +1,5 @@
 use std::cell::RefCell;
 use std::sync::OnceLock;
-
-use tactus_core::dsp::Kernels;
 use tactus_core::explorer::{Config, Method, Strategy};
 use tactus_core::features::{Blocks, SlideError};
 use tactus_core::probe::explore::{ExplorationStep, explore};
@@ -49,7 +47,7 @@ impl Rig for Streamed<'_> {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), SimError> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), SimError> {
         if self.rig.control().phase() == tactus_core::rig::Phase::Parked {
             self.rig.home()?;
         }

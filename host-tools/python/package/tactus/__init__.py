@@ -98,10 +98,10 @@ def evaluate(recordings, **arguments):
     drift: standard deviations of band powers (ln) and of traction (share) from session to session (0.1, 0.04).
     false_alarm: share of known textures that may be taken for new ones; the table's own, unless given.
     test: other `Recordings` to take the test slides from.
-    reliability: whether `reliability` and `by_threshold` are computed, a third of the work (True).
+    reliability: whether `reliability` is computed, a third of the work (True).
 
     Returns a dict with what `tactus evaluate --format json` prints, to the digit: shares 0 to 1, slides, `verdicts`,
-    `reliability`, `by_threshold`, `confused`.
+    `reliability`, `confused`.
     Raises TactusError where the slides do not suffice, ValueError for an argument, KeyboardInterrupt after Ctrl-C.
     """
     return _tactus.evaluate(recordings, _arguments(arguments))

@@ -9,12 +9,12 @@ use super::svg::{COLOURS, DrawError, EM, Figure, From, GREY, Tip, WIDTH, caption
 pub(crate) struct Tile {
     /// Written in it, where it has room.
     pub(crate) text: String,
-    /// How much of its colour it has, 0 to 1.
+    /// Opacity of its colour, 0 to 1.
     pub(crate) shade: f64,
     pub(crate) colour: RGBColor,
     /// With a thick frame.
     pub(crate) framed: bool,
-    /// For those who point at it; empty for nothing.
+    /// Tooltip; empty for none.
     pub(crate) says: String,
 }
 
@@ -22,11 +22,11 @@ pub(crate) struct Tile {
 pub(crate) struct Grid<'a> {
     pub(crate) id: String,
     pub(crate) title: String,
-    /// What it shows, for those who cannot see it.
+    /// Its description, for those who cannot see it.
     pub(crate) about: &'a str,
-    /// What the columns are, and the name of each.
+    /// Quantity of the columns, and the name of each.
     pub(crate) x: (&'a str, Vec<String>),
-    /// What the rows are, and the name of each, from the top.
+    /// Quantity of the rows, and the name of each, from the top.
     pub(crate) y: (&'a str, Vec<String>),
     /// Row by row.
     pub(crate) tiles: Vec<Vec<Tile>>,

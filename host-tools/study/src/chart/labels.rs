@@ -1,15 +1,15 @@
-//! Where words go in a drawing: how wide they are, in which lines, and beside which points.
+//! Layout of words in a drawing: their width, their lines, and their places beside points.
 
-/// Width of a letter as part of its height: that of wide ones in the usual fonts, so that words have room in all of them.
+/// Width of a letter as part of its height: that of wide ones in the usual fonts, so that words fit in all of them.
 const WIDE: f64 = 0.6;
 
-/// About how wide words of this height are, px.
+/// Estimated width of words of this height, px.
 pub(crate) fn width(words: &str, em: f64) -> i32 {
     (words.chars().count() as f64 * em * WIDE).ceil() as i32
 }
 
-/// Words in lines of at most so many px; a word that is longer has a line of its own. What a space without a break joins is
-/// one word.
+/// Words in lines of at most so many px; a word that is longer has a line of its own. Words that a space without a
+/// break joins count as one.
 pub(crate) fn lines(words: &str, em: f64, most: i32) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in words.split(' ').filter(|word| !word.is_empty()) {
@@ -38,7 +38,7 @@ const MARK: i32 = 5;
 const RINGS: i32 = 14;
 
 /// The middle of a label beside each point, so that labels cover neither each other nor a point nor one of `taken`, and
-/// stay in `inside`; `None` where there is no room. The first ones have the choice.
+/// stay in `inside`; `None` if there is no place. The first ones have the choice.
 pub(crate) fn place(
     points: &[(i32, i32)],
     labels: &[String],

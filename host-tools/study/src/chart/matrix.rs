@@ -5,10 +5,11 @@ use std::fmt::Write as _;
 use super::svg::{DrawError, Figure, WIDTH, figure};
 use super::{Chart, Series};
 
-/// Lower ends of the shades of a [`matrix`]: what is less is white.
+/// Lower ends of the shades of a [`matrix`]: lower degrees are white.
 pub(crate) const SHADES: [f32; 5] = [0.05, 0.2, 0.4, 0.6, 0.8];
 
-/// A symmetric matrix of degrees from 0 to 1 as an image, `title` above it: black is 1. `told` is for those who cannot see it.
+/// A symmetric matrix of degrees from 0 to 1 as an image, `title` above it: black is 1. `told` is for those who cannot
+/// see it.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -60,7 +61,8 @@ pub(crate) fn matrix(
     }
     let (width, height) = ((right - left) / n, (bottom - top) / n);
     drawn.add(&format!(
-        "<g shape-rendering=\"crispEdges\" transform=\"translate({left} {top}) scale({width} {height})\">\n{paths}</g>\n"
+        "<g shape-rendering=\"crispEdges\" transform=\"translate({left} {top}) scale({width} \
+         {height})\">\n{paths}</g>\n"
     ));
     Ok(drawn)
 }

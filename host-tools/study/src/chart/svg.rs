@@ -1,4 +1,4 @@
-//! A drawing as SVG: its colours and letters, light and dark, and what it says to those who cannot see it.
+//! A drawing as SVG: its colours and letters, light and dark, and its text for those who cannot see it.
 
 use std::fmt::Write as _;
 use std::io;
@@ -20,7 +20,7 @@ pub(crate) const COLOURS: [RGBColor; 7] = [
     RGBColor(230, 159, 0),
     RGBColor(0, 0, 0),
 ];
-/// For what is only there for comparison.
+/// Colour of lines that are only there for comparison.
 pub(crate) const GREY: RGBColor = RGBColor(110, 110, 110);
 /// Black for words that lie on lines: paper is left round them.
 pub(super) const INK: RGBColor = RGBColor(1, 1, 1);
@@ -33,17 +33,17 @@ pub(crate) const EM: f64 = TEXT as f64 / 1.24;
 pub(crate) const WIDTH: u32 = 480;
 pub(super) const FONT: &str = "sans-serif";
 
-/// The colours on a dark screen: what is white becomes dark and what is black light, and the darker colours brighter.
+/// The colours on a dark screen: white becomes dark and black light, and the darker colours brighter.
 const STYLE: &str = "<style>[fill=\"#010101\"]{paint-order:stroke;stroke:#fff;stroke-width:3px;stroke-linejoin:round}\
 @media screen and (prefers-color-scheme:dark){\
 rect[fill=\"#FFFFFF\"]{fill:#15181c}[stroke=\"#FFFFFF\"]{stroke:#15181c}\
 [fill=\"#010101\"]{fill:#ececec;stroke:#15181c}[fill=\"#000000\"]{fill:#ececec}[stroke=\"#000000\"]{stroke:#ececec}\
 [fill=\"#6E6E6E\"]{fill:#9a9a9a}[stroke=\"#6E6E6E\"]{stroke:#9a9a9a}\
 [fill=\"#0072B2\"]{fill:#2b8fd0}[stroke=\"#0072B2\"]{stroke:#2b8fd0}}</style>";
-/// How the outermost drawing fits its place.
+/// Style that fits the outermost drawing to its place.
 const FITS: &str = "style=\"max-width:100%;height:auto\"";
 
-/// Why drawing fails: drawing into a string does not, but the library says it might.
+/// Errors of drawing: drawing into a string does not fail, but the library allows for it.
 pub(super) type Failed = DrawingAreaErrorKind<io::Error>;
 pub(super) type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -61,7 +61,7 @@ pub struct DrawError {
 pub struct Figure {
     /// Name of its file, without the ending.
     pub id: String,
-    /// What it shows, for those who cannot see it.
+    /// Its description, for those who cannot see it.
     pub title: String,
     /// The drawing.
     pub svg: String,
@@ -70,13 +70,13 @@ pub struct Figure {
     size: (u32, u32),
 }
 
-/// What a part of a drawing says to those who point at it or cannot see it.
+/// Text of a part of a drawing for those who point at it or cannot see it.
 pub(super) struct Tip {
     pub(super) area: Area,
     pub(super) says: String,
 }
 
-/// A drawing of this size in px on white paper; `draw` gives what its parts say. `about` is its description.
+/// A drawing of this size in px on white paper; `draw` returns the texts of its parts. `about` is its description.
 pub(super) fn figure(
     id: impl Into<String>,
     title: &str,
@@ -133,7 +133,8 @@ impl Figure {
         let width = figures.iter().map(|f| f.size.0).max().unwrap_or(0);
         let height: u32 = figures.iter().map(|f| f.size.1).sum();
         let mut svg = format!(
-            "<svg {FITS} width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n",
+            "<svg {FITS} width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n",
             escaped(title)
         );
         let mut y = 0;
@@ -159,7 +160,7 @@ pub fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Where the words of [`write`] are from their place.
+/// Place of the words of [`write`] from their point.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum From {
     /// They begin there.
@@ -191,7 +192,7 @@ pub(super) fn write(
     root.draw(&Text::new(words.to_owned(), at, style))
 }
 
-/// Writes the title at the top, in as many lines as it takes; gives the px that they take.
+/// Writes the title at the top, in as many lines as it takes; returns their height in px.
 pub(super) fn caption(root: &Root<'_>, title: &str, width: u32) -> Result<u32, Failed> {
     const LINE: i32 = TEXT as i32 + 3;
     let mut y = 14;

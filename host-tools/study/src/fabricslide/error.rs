@@ -1,4 +1,4 @@
-//! Why a folder of fabrics cannot be read.
+//! Reasons why a folder of fabrics cannot be read.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use tactus_lab::data::recordings::files::RecordingError;
 /// Name of the manifest.
 pub const MANIFEST: &str = "manifest.json";
 
-/// Why fabrics cannot be read. Every message names the file, the cause and what to do.
+/// Reasons why fabrics cannot be read. Every message names the file, the cause and a remedy.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
 pub enum FabricError {
@@ -17,18 +17,19 @@ pub enum FabricError {
     NoFolder(PathBuf),
     /// The folder has no manifest.
     #[error(
-        "{}: no {MANIFEST} in this folder, so it holds no fabrics; give one in the layout of data/fabricslide", .0.display()
+        "{}: no {MANIFEST} in this folder, so it holds no fabrics; give one in the layout of \
+         data/fabricslide", .0.display()
     )]
     NoManifest(PathBuf),
     /// The fabrics cannot be compared.
     #[error(
-        "{}: no movement that all {fabrics} fabrics have with both repetitions (rep 0 and 1) in one direction; take out the \
-         fabric that lacks them or record it again", manifest.display()
+        "{}: no movement that all {fabrics} fabrics have with both repetitions (rep 0 and 1) in one direction; take \
+         out the fabric that lacks them or record it again", manifest.display()
     )]
     NothingShared {
         /// The manifest.
         manifest: PathBuf,
-        /// How many fabrics it lists.
+        /// Number of fabrics that it lists.
         fabrics: usize,
     },
     /// A slide from which nothing can be measured.
@@ -42,10 +43,10 @@ pub enum FabricError {
         direction: i8,
         /// As in the manifest.
         repetition: u8,
-        /// What is wrong with it, and what to do.
+        /// The fault, and its remedy.
         cause: ContentError,
     },
-    /// A file cannot be read or is not what its manifest says.
+    /// A file cannot be read or differs from its manifest.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }

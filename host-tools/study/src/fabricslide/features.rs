@@ -20,12 +20,12 @@ const FRAME: usize = 256;
 const HOP: usize = 128;
 /// Bins of the single-sided spectrum, both ends included.
 const BINS: usize = FRAME / 2 + 1;
-/// Fewest samples that are measured: with an eighth of a frame, 11 Hz is as low as a spectrum can tell anything.
+/// Fewest samples that are measured: with an eighth of a frame, 11 Hz is the lowest frequency that a spectrum resolves.
 pub(super) const SHORTEST: usize = FRAME / 8;
 /// Added to the power of a band, in counts^2 (a silent band has a logarithm, and small differences there are noise).
 const BAND_FLOOR: f64 = 0.1;
-/// Variance below which a taxel shows nothing but a straight line and the rounding of f64. A single step of one count among
-/// 2^22 samples has more.
+/// Variance below which a taxel shows nothing but a straight line and the rounding of f64. A single step of one count
+/// among 2^22 samples has more.
 const FLAT: f64 = 1e-9;
 /// Smallest decorrelation: taxels that move as one have a logarithm. Those of data/fabricslide are at 0.27 or more.
 const RIGID: f64 = 1e-6;
@@ -87,8 +87,8 @@ impl Meter {
         })
     }
 
-    /// |X|^2 over the sum of the squares of the window, averaged over taxels and whole frames. A slide that is shorter than
-    /// a frame makes one, zeros behind it.
+    /// Averaged spectrum: |X|^2 over the sum of the squares of the window, mean over taxels and whole frames. A slide
+    /// that is shorter than a frame makes one, with zeros behind it.
     fn spectrum(&self, taxels: &[Vec<f64>; TAXELS]) -> [f64; BINS] {
         let mut sum = [0.0; BINS];
         let mut frames = 0;
@@ -132,7 +132,7 @@ fn detrended(rows: &[u8], taxel: usize) -> Vec<f64> {
     samples
 }
 
-/// Centroid of a spectrum in bins, without bin 0: what a window lets through of the mean is no texture.
+/// Centroid of a spectrum in bins, without bin 0: the window's leakage of the mean is no texture.
 fn centroid(spectrum: &[f64; BINS]) -> f64 {
     let (mut moment, mut power) = (0.0, 0.0);
     for (bin, p) in spectrum.iter().enumerate().skip(1) {

@@ -1,7 +1,7 @@
-//! `manifest.json` of a folder of fabrics: read, checked, and searched for what all fabrics share.
+//! `manifest.json` of a folder of fabrics: read, checked, and searched for the movements that all fabrics share.
 //!
-//! What is taken from it: per file its name, fabric and both hashes, and per recording set-point, speed, direction,
-//! repetition, its number of rows and where its first value is.
+//! Fields that are read from it: per file its name, fabric and both hashes, and per recording set-point, speed,
+//! direction, repetition, its number of rows and the place of its first value.
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fmt;
 use std::ops::Range;
@@ -20,7 +20,7 @@ const MAX_RAW: u64 = 1 << 28;
 /// Most recordings of one fabric. FabricSlide has 120.
 const MAX_RECORDINGS: usize = 4096;
 
-/// What the manifest says, checked.
+/// The contents of a manifest, checked.
 #[derive(Debug)]
 pub(super) struct Manifest {
     path: PathBuf,
@@ -46,7 +46,7 @@ pub(super) struct Action {
     speed_um_s: u32,
 }
 
-/// What tells one recording of a fabric from the others.
+/// Key of one recording of a fabric.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Key {
     action: Action,
@@ -54,7 +54,7 @@ pub(super) struct Key {
     repetition: u8,
 }
 
-/// What all fabrics have.
+/// The movements that all fabrics share.
 #[derive(Debug)]
 pub(super) struct Shared {
     actions: Vec<Action>,
@@ -170,7 +170,7 @@ impl Manifest {
         })
     }
 
-    /// What every fabric has with both repetitions in one direction.
+    /// The movements that every fabric has with both repetitions in one direction.
     fn shared_in(&self, direction: i8) -> BTreeSet<Action> {
         let Some((first, others)) = self.fabrics.split_first() else {
             return BTreeSet::new();
@@ -189,7 +189,7 @@ impl Manifest {
     }
 }
 
-/// What is left when the set-point or speed that lacks the largest share of the movements is taken out, until none lacks any.
+/// The rest after removing the set-point or speed that lacks the largest share of the movements, until none lacks any.
 fn whole_grid(mut actions: BTreeSet<Action>) -> BTreeSet<Action> {
     loop {
         let mut setpoints: BTreeMap<u16, usize> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Folders of fabrics, whole and damaged, and what is measured of slides that are known.
+//! Folders of fabrics, whole and damaged, and the features of known slides.
 use std::f64::consts::PI;
 use std::fs;
 use std::io::Write as _;
@@ -69,7 +69,8 @@ fn fabric(folder: &Path, name: &str, recordings: &[Recording], raw: &[u8]) -> Va
     }
     json!({
         "file": file, "fabric": name, "slides": slides,
-        "sha256_gz": tactus_lab::data::recordings::files::sha256(&packed), "sha256_raw": tactus_lab::data::recordings::files::sha256(raw),
+        "sha256_gz": tactus_lab::data::recordings::files::sha256(&packed),
+        "sha256_raw": tactus_lab::data::recordings::files::sha256(raw),
     })
 }
 
@@ -161,7 +162,7 @@ fn the_start_of_a_recording_is_dropped_and_the_rest_halved() {
     assert_eq!(cut(&(0..213)), [12..112, 112..212]);
     assert_eq!(cut(&(5..6)), [5..5, 5..5]);
 
-    // what is dropped is not measured
+    // the dropped part is not measured
     let recordings = [(120, 10, 1, 0, 300), (120, 10, 1, 1, 300)];
     let folder = TempDir::new().unwrap();
     let loud = |t: usize, taxel: usize| match t % 300 {

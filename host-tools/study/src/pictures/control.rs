@@ -1,4 +1,4 @@
-//! A control chart: how far each reading is from the mean of its part and operator, in the order of time.
+//! A control chart: the distance of each reading from the mean of its part and operator, in the order of time.
 
 use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
 use tactus_lab::eval::gauge::{Reading, Study, distinct};
@@ -6,7 +6,7 @@ use tactus_lab::eval::gauge::{Reading, Study, distinct};
 /// Height of the chart without its words, px.
 const TALL: u32 = 320;
 
-/// The chart of one property, of which `readings` came to `study`; `unit` follows the name of the axis.
+/// The chart of one property, with the `study` of its `readings`; `unit` follows the name of the axis.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -65,8 +65,8 @@ pub fn figure(
             ..Series::points(1, Mark::Cross, "outside the limits", outside.collect())
         });
     }
-    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed: three standard deviations, by \
-                 the mean moving range. A slide outside is worth a look at the sample, the finger and the rig.";
+    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed: three standard \
+         deviations, by the mean moving range. A slide outside is worth a look at the sample, the finger and the rig.";
     let y = format!("away from the mean{unit}");
     Chart {
         size: (WIDTH, TALL + Chart::height_of(below)),

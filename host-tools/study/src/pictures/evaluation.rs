@@ -1,14 +1,13 @@
-//! What `tactus evaluate` draws: what was told of each texture, how often it was right when it said so, and what another
-//! threshold would change.
+//! Pictures of `tactus evaluate`: the verdicts on each texture, and the reliability of the probabilities.
 
 use tactus_core::explorer::Told;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
 use tactus_lab::eval::courses::Course;
-use tactus_lab::eval::reliability::{self, Statements, statements, verdicts};
+use tactus_lab::eval::reliability::{Statements, statements, verdicts};
 
-/// The three pictures of explorations that went like this, among textures of these names, at this threshold.
+/// The two pictures of these explorations, among textures of these names, at this threshold.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -17,18 +16,16 @@ pub fn figures(
     names: &[String],
     threshold: f32,
 ) -> Result<Vec<Figure>, DrawError> {
-    let mut figures = vec![
+    Ok(vec![
         confusion(courses, names, threshold)?,
         reliability(courses, threshold)?,
-    ];
-    figures.extend(by_threshold(courses, threshold)?);
-    Ok(figures)
+    ])
 }
 
 /// More names than this are written as numbers below the columns, and no share is written into a cell.
 const FEW: usize = 12;
 
-/// What was told, row by row: textures presented, and columns of what was told.
+/// Verdicts, row by row: presented textures, and columns of verdicts.
 fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Figure, DrawError> {
     let known = names.len();
     let mut counts = vec![vec![0_u64; known + 3]; known];
@@ -84,7 +81,8 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
     let columns = numbers.chain(["C", "N", "?"].map(str::to_owned));
     let verdicts = verdicts(courses, threshold);
     let about = format!(
-        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, {:.1} % with none of those known and {:.1} % undecided.",
+        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, \
+         {:.1} % with none of those known and {:.1} % undecided.",
         courses.len(),
         100.0 * verdicts.right,
         100.0 * verdicts.wrong,
@@ -93,13 +91,15 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
         100.0 * verdicts.undecided
     );
     let below = if known > FEW {
-        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
+        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of \
+         those known (N), not sure (?)."
     } else {
-        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those known (N), not sure (?)."
+        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those \
+         known (N), not sure (?)."
     };
     Grid {
         id: "confusion".to_owned(),
-        title: format!("What is told of each texture, at {} %", percent(threshold)),
+        title: format!("Verdicts on each texture, at {} %", percent(threshold)),
         about: &about,
         x: ("told: the texture of this number", columns.collect()),
         y: ("presented", rows.collect()),
@@ -114,7 +114,7 @@ fn percent(share: f32) -> f64 {
     (f64::from(share) * 1e6).round() / 1e4
 }
 
-/// Between which shares the true one is, 95 times of 100, if `right` of `count` were found (Wilson 1927).
+/// Confidence interval of 95 % for the true share, if `right` of `count` were found (Wilson 1927).
 fn wilson(right: u64, count: u64) -> (f64, f64) {
     const Z: f64 = 1.96;
     let (n, p) = (count as f64, right as f64 / count as f64);
@@ -131,7 +131,7 @@ fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> 
         "was right (bar: 95 % of such counts)",
         Vec::new(),
     );
-    let mut said = Series::dashed("what it said (mean)", Vec::new());
+    let mut said = Series::dashed("as stated (mean)", Vec::new());
     for (bin, x) in bins.iter().zip(1..).filter(|(bin, _)| bin.count > 0) {
         let (x, of) = (f64::from(x), bin.count as f64);
         let mean = 100.0 * bin.said.unwrap_or_default();
@@ -180,81 +180,4 @@ fn range(bin: &Statements) -> String {
         (low, 100.0) => format!("\u{2265}{low}"),
         (low, high) => format!("{low}\u{2013}{high}"),
     }
-}
-
-/// Slides, and what is told, by the threshold.
-fn by_threshold(courses: &[Course], threshold: f32) -> Result<Vec<Figure>, DrawError> {
-    let by_threshold = reliability::by_threshold(courses, threshold);
-    let thresholds: Vec<f32> = by_threshold.iter().map(|at| at.threshold).collect();
-    let at = thresholds.iter().position(|&t| t == threshold);
-    let at = at.unwrap_or(0) as f64 + 1.0;
-    let text = |x: f64| {
-        let at = (x.round() as usize).wrapping_sub(1);
-        thresholds
-            .get(at)
-            .map_or_else(String::new, |&t| percent(t).to_string())
-    };
-    let x_range = (0.5, thresholds.len() as f64 + 0.5);
-    let x = "threshold: sure above this probability (%)";
-    let mut slides = Series::curve(0, MARKS[0], "", Vec::new());
-    let mut told = [
-        ("told a wrong name as sure", 1),
-        ("told none of those known", 2),
-        ("told a changed one", 3),
-        ("undecided", 0),
-    ]
-    .map(|(name, colour)| Series::curve(colour, MARKS[colour], name, Vec::new()));
-    for (at, n) in by_threshold.iter().zip(1..) {
-        let n = f64::from(n);
-        let (mean, v) = (at.mean_slides, at.verdicts);
-        slides.points.push((n, mean));
-        let shown = percent(at.threshold);
-        slides.says.push(format!("at {shown} %: {mean:.2} slides"));
-        for (series, share) in told
-            .iter_mut()
-            .zip([v.wrong, v.new, v.changed, v.undecided])
-        {
-            let share = 100.0 * share;
-            series.points.push((n, share));
-            let name = &series.name;
-            series
-                .says
-                .push(format!("at {shown} %: {share:.2} % {name}"));
-        }
-    }
-    let used = |top: f64| Series::dashed("the threshold in use", vec![(at, 0.0), (at, top)]);
-    let most = |series: &[Series]| {
-        let points = series.iter().flat_map(|s| &s.points);
-        1.1 * points.map(|p| p.1).fold(0.1, f64::max)
-    };
-    let top = most(std::slice::from_ref(&slides));
-    let slides = Chart {
-        y_range: (0.0, top),
-        x_marks: thresholds.len(),
-        x_text: &text,
-        ..Chart::new(
-            "Slides by threshold",
-            x,
-            "slides until the answer (mean)",
-            x_range,
-            vec![used(top), slides],
-        )
-    }
-    .figure("slides-by-threshold")?;
-    let top = most(&told);
-    let [wrong, new, changed, undecided] = told;
-    let errors = Chart {
-        y_range: (0.0, top),
-        x_marks: thresholds.len(),
-        x_text: &text,
-        ..Chart::new(
-            "Errors by threshold",
-            x,
-            "explorations (%)",
-            x_range,
-            vec![used(top), wrong, new, changed, undecided],
-        )
-    }
-    .figure("errors-by-threshold")?;
-    Ok(vec![slides, errors])
 }

@@ -1,4 +1,4 @@
-//! What an exploration draws: how the posterior went, the spectrum beside its two best candidates, and one slide.
+//! Pictures of an exploration: the course of the posterior, the spectrum beside its two best candidates, and one slide.
 
 use std::fmt::Display;
 
@@ -47,7 +47,7 @@ impl<'t> Exploration<'t> {
         }
     }
 
-    /// Takes what a probe says of it; anything else is nothing of it.
+    /// Takes a probe's event of it; ignores any other.
     pub fn event(&mut self, event: &Event) {
         if let Event::SlideReport {
             action,

@@ -1,4 +1,4 @@
-//! A map of the textures of a table: how far they are apart, as well as a plane can show it.
+//! A map of the textures of a table: their distances, as well as a plane can show them.
 
 use tactus_core::table::Table;
 
@@ -48,8 +48,8 @@ pub fn figure(table: Table<'_>) -> Result<Figure, DrawError> {
     }
     series.push(textures);
     let below = format!(
-        "Distance: in standard deviations between slides of one texture. In a plane distances are not quite right: here \
-         they are off by {:.0} % (root mean square). Dashed: to the texture that is nearest in truth.",
+        "Distance: in standard deviations between slides of one texture. In a plane distances are not quite right: \
+         here they are off by {:.0} % (root mean square). Dashed: to the texture that is nearest in truth.",
         100.0 * off(&distances, &places)
     );
     let list: Vec<String> = names
@@ -66,7 +66,7 @@ pub fn figure(table: Table<'_>) -> Result<Figure, DrawError> {
     let axis = "distance (standard deviations)";
     Chart {
         y_range,
-        // what stands above and below the axes, and as many lines as the chart makes of the words
+        // the space above and below the axes, and as many lines as the chart makes of the words
         size: (WIDTH, tall + 88 + Chart::height_of(&below)),
         below: &below,
         ..Chart::new("Map of the table's textures", axis, axis, x_range, series)
@@ -77,7 +77,7 @@ pub fn figure(table: Table<'_>) -> Result<Figure, DrawError> {
 /// Width of the area between the axes, and its least and greatest height, px.
 const INSIDE: (f64, f64, f64) = (388.0, 360.0, 460.0);
 
-/// Ranges of the axes with all places and some room for names, and the height between the axes at which both have the
+/// Ranges of the axes with all places and a margin for names, and the height between the axes at which both have the
 /// same scale.
 fn ranges(places: &[(f64, f64)]) -> ((f64, f64), (f64, f64), u32) {
     let ends = |of: fn(&(f64, f64)) -> f64| {
@@ -88,7 +88,7 @@ fn ranges(places: &[(f64, f64)]) -> ((f64, f64), (f64, f64), u32) {
     let ((x, wide), (y, high)) = (ends(|p| p.0), ends(|p| p.1));
     let (width, least, most) = INSIDE;
     let tall = (width * high / wide).clamp(least, most);
-    // the wider of the two in its own direction says the scale
+    // the wider of the two in its own direction sets the scale
     let scale = (wide / width).max(high / tall);
     let (wide, high) = (scale * width, scale * tall);
     ((x - wide, x + wide), (y - high, y + high), tall as u32)

@@ -102,7 +102,7 @@ fn mean(vectors: impl Iterator<Item = Vec<f64>>) -> Option<Vec<f64>> {
     sum.map(|(sum, count)| sum.into_iter().map(|x| x / count).collect())
 }
 
-/// What the table knows of the features of a texture at a movement.
+/// The learned Gaussians of a texture at a movement.
 fn known(table: Table<'_>, texture: u16, movement: u8) -> Option<Vec<Feature>> {
     if table.trials(texture, movement) == 0 {
         return None;
@@ -119,7 +119,8 @@ fn known(table: Table<'_>, texture: u16, movement: u8) -> Option<Vec<Feature>> {
     }
 }
 
-/// The mean of a texture as features, and how they scatter within a texture: what the table's whitening z = W (x - g) hides.
+/// The mean of a texture as features, and their scatter within a texture: the inverse of the table's whitening z = W (x
+/// - g).
 fn unwhitened(table: Table<'_>, texture: u16, movement: u8) -> Option<Vec<Feature>> {
     let whitening = table.whitening(movement)?;
     let n = whitening.features();

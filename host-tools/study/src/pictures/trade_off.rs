@@ -1,4 +1,4 @@
-//! What `tactus evaluate --verify` draws: false rejects against false accepts, limit by limit.
+//! Picture of `tactus evaluate --verify`: false rejects against false accepts, limit by limit.
 
 use crate::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
 use tactus_lab::eval::show::count;

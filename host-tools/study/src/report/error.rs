@@ -1,11 +1,11 @@
-//! Why a report cannot be written.
+//! Reasons why a report cannot be written.
 
 use std::io;
 use std::path::PathBuf;
 
 use crate::chart::DrawError;
 
-/// Why a report cannot be written.
+/// Reasons why a report cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder has something in it.
@@ -19,20 +19,12 @@ pub enum ReportError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// A figure failed.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// A table does not become a file.
-    #[error("the table {table} of the report cannot be written; please report this")]
-    Table {
-        /// Name of its file, without the ending.
-        table: String,
-        /// The first row that does not fit.
-        source: csv::Error,
-    },
     /// The study does not become JSON.
     #[error("the study cannot be written as JSON; please report this")]
     Json(#[source] serde_json::Error),

@@ -1,5 +1,5 @@
-//! The folder of a study: under another name until it is whole, with the stages that are done, so that a study that was
-//! interrupted goes on.
+//! The folder of a study: under another name until it is whole, with the finished stages, so that an interrupted study
+//! can continue.
 
 use std::fs::{self, File};
 use std::io;
@@ -12,15 +12,15 @@ use super::error::ReportError;
 use tactus_lab::data::program::program;
 use tactus_lab::data::whole::write_whole;
 
-/// What a folder has in it while it is not whole: which study it is.
+/// Name of the mark in a folder that is not whole: it names the study.
 const INCOMPLETE: &str = "INCOMPLETE";
 /// The stages that are done.
 const STAGES: &str = "stages";
-/// What gets the folder's name.
+/// Name of the part that gets the folder's name.
 const WHOLE: &str = "whole";
 
-/// A folder that a report is written into: below `DIR.part`, until it is whole. The stages of a study that was interrupted are
-/// kept there for the next one, if that is the same; any other study replaces them.
+/// A folder that a report is written into: below `DIR.part`, until it is whole. The stages of a study that was
+/// interrupted are kept there for the next one, if that is the same; any other study replaces them.
 #[derive(Debug)]
 pub struct Folder {
     whole: PathBuf,
@@ -30,8 +30,9 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Makes the folder of the report of a study, which is to be `whole`; that must be empty or new. `study` tells it from every
-    /// other study of this program. Before the work, not after it: a study takes minutes.
+    /// Makes the folder of the report of a study, which is to be `whole`; that must be empty or new. `study`
+    /// distinguishes it from every other study of this program. Called before the work, not after it: a study takes
+    /// minutes.
     ///
     /// # Errors
     /// See [`ReportError`].
@@ -75,7 +76,7 @@ impl Folder {
             return Err(ReportError::Taken(folder.whole.clone()));
         }
         let says = format!(
-            "{study}\nThe same command goes on with this study; another one with this --out replaces it.\n({})\n",
+            "{study}\nThe same command continues this study; another one with this --out replaces it.\n({})\n",
             program()
         );
         if fs::read_to_string(&note).is_ok_and(|there| there != says) {
@@ -85,18 +86,18 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Where a stage is kept.
+    /// Path of a stage's file.
     fn stage(&self, name: &str) -> PathBuf {
         self.part.join(STAGES).join(name).with_extension("json")
     }
 
-    /// What a stage came to in a study that was interrupted.
+    /// The result of a stage of an interrupted study.
     pub fn kept<T: DeserializeOwned>(&self, stage: &str) -> Option<T> {
-        // what cannot be read is made again
+        // an unreadable stage is made again
         serde_json::from_slice(&fs::read(self.stage(stage)).ok()?).ok()
     }
 
-    /// Keeps what a stage came to, whole or not at all.
+    /// Keeps the result of a stage, whole or not at all.
     ///
     /// # Errors
     /// See [`ReportError`].
@@ -108,7 +109,7 @@ impl Folder {
             .map_err(|source| error(&path, source))
     }
 
-    /// Removes what a study wrote that was interrupted while it wrote.
+    /// Removes the output of a study that was interrupted while writing.
     pub(super) fn clear(&self) -> Result<(), ReportError> {
         self.remove(&self.part.join(WHOLE))
     }
@@ -140,7 +141,7 @@ impl Folder {
 }
 
 impl Drop for Folder {
-    /// A study that failed before its first stage was done leaves nothing; what is kept of another one stays.
+    /// A study that failed before its first stage was done leaves no files; those of another one stay.
     fn drop(&mut self) {
         if !self.part.join(STAGES).exists() {
             // one that is whole has its name
@@ -168,10 +169,10 @@ mod tests {
         let folder = prepare("one").unwrap();
         folder.put("tables/a.csv", b"a").unwrap();
         assert!(matches!(prepare("one"), Err(ReportError::Busy(_))));
-        // one that fails before anything is done leaves nothing
+        // one that fails before its first stage leaves no files
         drop(folder);
         assert!(!whole.exists() && !part.exists());
-        // the same study goes on
+        // the same study continues
         let third = 1.0 / 3.0;
         let folder = prepare("one").unwrap();
         folder.put("tables/a.csv", b"a").unwrap();
@@ -181,7 +182,7 @@ mod tests {
         assert!(!whole.exists());
         assert_eq!(folder.kept("pilot"), Some(vec![third, 1e300 * third]));
         assert_eq!(folder.kept::<f64>("training"), None);
-        // what is damaged is not believed
+        // a damaged stage is not used
         fs::write(folder.stage("pilot"), b"[0.33").unwrap();
         assert_eq!(folder.kept::<Vec<f64>>("pilot"), None);
         folder.keep("pilot", &third).unwrap();
@@ -195,7 +196,7 @@ mod tests {
         folder.finish().unwrap();
         assert_eq!(fs::read(whole.join("tables/b.csv")).unwrap(), b"b");
         assert!(!whole.join("tables/a.csv").exists() && !part.exists());
-        // what is there is never touched
+        // existing files are never touched
         assert!(matches!(prepare("two"), Err(ReportError::Taken(path)) if path == whole));
         // it was killed when it was whole: the rest goes
         fs::create_dir(&part).unwrap();

@@ -55,7 +55,7 @@ fn mean<T>(rows: &[T], of: impl Fn(&T) -> f64) -> f64 {
     rows.iter().map(of).sum::<f64>() / rows.len().max(1) as f64
 }
 
-/// What a way of exploring is called, in full and in short, and its column of the paper's Table 5.
+/// Full and short name of a way of exploring, and its column of the paper's Table 5.
 fn names(method: Method) -> (&'static str, &'static str, Option<published::Column>) {
     let (in_full, paper) = match method {
         Method::Cycle => ("uninformed cycling", Some(published::CYCLING)),
@@ -127,12 +127,16 @@ pub(super) fn add(identification: &Identification, report: &mut Report) -> Resul
         let ours = identification.column(method)?.correct;
         Some(format!("{:+.1}", ours - names(method).2?.correct))
     });
-    let words = json!({"simulations": identification.simulations, "cycled": cycled.collect::<Vec<_>>(), "against": against.into_iter().collect::<Option<Vec<_>>>()});
+    let words = json!({
+        "simulations": identification.simulations,
+        "cycled": cycled.collect::<Vec<_>>(),
+        "against": against.into_iter().collect::<Option<Vec<_>>>(),
+    });
     report.words.insert("identification", words);
     Ok(())
 }
 
-/// Adds what users would have been told.
+/// Adds the verdicts.
 fn add_told(identification: &Identification, report: &mut Report) {
     let row = |(method, told): (Method, &ToldColumn)| {
         let v = &told.verdicts;
@@ -155,7 +159,7 @@ fn add_told(identification: &Identification, report: &mut Report) {
     report.table("verdicts", &header, rows.collect());
 }
 
-/// How the probabilities evolve in one exploration.
+/// The course of the probabilities in one exploration.
 fn fig10_panel(n: u8, evolution: &Evolution) -> Result<Figure, DrawError> {
     let steps = evolution.steps.len() as f64;
     let step = |x: f64| {
@@ -200,7 +204,7 @@ fn fig10_panel(n: u8, evolution: &Evolution) -> Result<Figure, DrawError> {
     .figure(format!("fig10-{n}"))
 }
 
-/// Adds what came out in each world, and what was asked.
+/// Adds the results in each world, and the demands.
 pub(super) fn add_worlds(worlds: &[WorldRow], report: &mut Report) -> Result<(), DrawError> {
     let mut rows = Rows::new();
     for world in worlds {
@@ -263,7 +267,7 @@ pub(super) fn add_worlds(worlds: &[WorldRow], report: &mut Report) -> Result<(),
     Ok(())
 }
 
-/// What the study is to show over ten worlds, and whether it does.
+/// The demands on the study over ten worlds, and whether they are met.
 fn demands(worlds: &[WorldRow]) -> Rows {
     let n = worlds.len();
     let column = |world: &WorldRow, method: Method, of: fn(&Column) -> f64| {

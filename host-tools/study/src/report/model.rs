@@ -1,4 +1,4 @@
-//! What a report is made of: tables, figures, and the numbers that its page puts between its words.
+//! The parts of a report: tables, figures, and the numbers that its page puts between its words.
 
 use std::collections::BTreeMap;
 
@@ -8,17 +8,14 @@ use tactus_core::features::Property;
 
 use crate::chart::Figure;
 
-/// All that a study shows: the page's template says where each piece stands and what is said about it.
+/// The contents of a report: the page's template gives the place of each piece and the text about it.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Report {
-    /// Tables that the page shows, by the names of their files.
+    /// Tables that the page shows, by their names.
     pub(super) tables: BTreeMap<&'static str, Table>,
-    /// Tables that are too large to read: the page only names their files.
-    #[serde(skip)]
-    pub(super) files: BTreeMap<String, Table>,
     /// The panels of the page's figures, by figure.
     pub(super) figures: BTreeMap<&'static str, Vec<Figure>>,
-    /// What stands between the words, by section.
+    /// Values in the text, by section.
     #[serde(flatten)]
     pub(super) words: BTreeMap<&'static str, Value>,
 }
@@ -29,21 +26,11 @@ impl Report {
         self.tables.insert(
             id,
             Table {
-                header: owned(header),
+                header: header.iter().map(|&name| name.to_owned()).collect(),
                 rows,
             },
         );
     }
-
-    /// Adds a table that is too large to read.
-    pub(super) fn file(&mut self, id: &str, header: Vec<String>, rows: Rows) {
-        self.files.insert(id.to_owned(), Table { header, rows });
-    }
-}
-
-/// Names of columns.
-pub(super) fn owned(names: &[&str]) -> Vec<String> {
-    names.iter().map(|&name| name.to_owned()).collect()
 }
 
 /// A movement by its force in N and its speed in mm/s.
@@ -71,32 +58,15 @@ pub(super) struct Table {
     pub(super) rows: Rows,
 }
 
-impl Table {
-    /// The table as a file: every number with all its digits.
-    pub(super) fn csv(&self) -> Result<Vec<u8>, csv::Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&self.header)?;
-        for row in &self.rows {
-            writer.write_record(row.iter().map(|cell| &cell.exact))?;
-        }
-        writer
-            .into_inner()
-            .map_err(|failed| failed.into_error().into())
-    }
-}
-
 /// A cell of a table.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Cell {
-    /// What people see.
+    /// The text for people.
     shown: String,
-    /// What files have: all digits.
-    #[serde(skip)]
-    exact: String,
     number: bool,
 }
 
-/// The cells of a row: words, and numbers with how many decimals of them people see.
+/// The cells of a row: words, and numbers with the number of decimals for people.
 macro_rules! cells {
     ($($cell:expr),* $(,)?) => { vec![$($crate::report::model::Cell::from($cell)),*] };
 }
@@ -105,8 +75,7 @@ pub(super) use cells;
 impl From<String> for Cell {
     fn from(words: String) -> Self {
         Self {
-            shown: words.clone(),
-            exact: words,
+            shown: words,
             number: false,
         }
     }
@@ -128,7 +97,6 @@ impl From<(f64, usize)> for Cell {
     fn from((value, decimals): (f64, usize)) -> Self {
         Self {
             shown: format!("{value:.decimals$}"),
-            exact: value.to_string(),
             number: true,
         }
     }

@@ -3,7 +3,7 @@
 use serde_json::json;
 use tactus_core::features::Movement;
 
-use super::model::{Cell, Report, axis, cells, movement_name, owned};
+use super::model::{Cell, Report, axis, cells, movement_name};
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::{COLOURS, Chart, DrawError, Figure, Mark, PANEL, Series};
 use crate::pilot::{Missed, MostUseful, Pilot, PilotMovement};
@@ -12,7 +12,7 @@ use crate::published::PILOT_TRIALS;
 /// The textures of fig. 6 whose centroid rises with speed.
 const COARSE: [u8; 4] = [10, 30, 87, 100];
 
-/// Adds what the pilot study found.
+/// Adds the results of the pilot study.
 pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
     let useful = |m: &MostUseful| {
         let left = |at: usize| (pilot.movements[at].uncertainty[m.property.index()], 3);
@@ -70,35 +70,6 @@ pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
         ],
         pilot.movements.iter().map(movement).collect(),
     );
-    let mut rows = Vec::new();
-    for (texture, movements) in pilot.textures.iter().zip(&pilot.properties) {
-        for (trials, m) in movements.iter().zip(&pilot.movements) {
-            for (trial, of) in (1_u8..).zip(trials) {
-                let [traction, roughness, fineness] = of.map(|p| (p, 4));
-                rows.push(cells![
-                    texture.number,
-                    texture.name,
-                    (m.force_n, 2),
-                    (m.speed_mm_s, 1),
-                    trial,
-                    traction,
-                    roughness,
-                    fineness,
-                ]);
-            }
-        }
-    }
-    let header = [
-        "texture",
-        "name",
-        "force, N",
-        "speed, mm/s",
-        "trial",
-        "traction, N",
-        "roughness",
-        "fineness",
-    ];
-    report.file("pilot-properties", owned(&header), rows);
     let drawn = |of: fn(&Pilot, &MostUseful) -> Result<Figure, DrawError>| {
         let figures = pilot.most_useful.iter().map(|useful| of(pilot, useful));
         figures.collect::<Result<Vec<_>, _>>()
@@ -113,7 +84,7 @@ pub(super) fn add(pilot: &Pilot, report: &mut Report) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// What stands in place of the uncertainty of a movement that the rig could not make on every texture.
+/// Text in place of the uncertainty of a movement that the rig could not make on every texture.
 fn not_reached(m: &PilotMovement) -> Option<String> {
     let missed = |m: &Missed| format!("T{}, trial {}: {}", m.texture, m.trial, m.reason);
     let missed: Vec<String> = m.not_reached.iter().map(missed).collect();
@@ -176,7 +147,7 @@ fn fig6(pilot: &Pilot) -> Result<Figure, DrawError> {
     .figure("fig6")
 }
 
-/// Uncertainty by force and speed: the least is framed, what wears the skin is grey.
+/// Uncertainty by force and speed: the least is framed, movements that wear the skin are grey.
 fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
     let property = useful.property;
     let left = |m: &PilotMovement| f64::from(m.uncertainty[property.index()]);

@@ -1,4 +1,4 @@
-//! What the sensor says, in the report: figs. 3 and 4.
+//! The sensor's signals in the report: figs. 3 and 4.
 
 use serde_json::json;
 

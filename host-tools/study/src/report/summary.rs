@@ -1,4 +1,4 @@
-//! What came out, on one screen: the first table of the report.
+//! The results on one screen: the first table of the report.
 
 use super::model::{Report, Rows, cells};
 use crate::published;

@@ -3,16 +3,16 @@
 use serde_json::json;
 use tactus_core::features::{Movement, Property};
 
-use super::model::{Report, Rows, axis, cells, movement_name, owned};
+use super::model::{Report, axis, cells, movement_name};
 use crate::chart::matrix::{SHADES, matrix};
 use crate::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, buffer};
 use crate::published::{MOST_USEFUL, TRIALS};
 use crate::training::Training;
 
-/// What the axes of textures show.
+/// Label of the axes of textures.
 const TEXTURES: &str = "number of the texture (Table 1)";
 
-/// Adds what the training found.
+/// Adds the results of the training.
 pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawError> {
     let names: Vec<String> = training
         .movements
@@ -60,18 +60,6 @@ pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawEr
     let header = ["file", "contents", "bytes", "CRC-32"];
     report.table("tables-of-the-chip", &header, files.collect());
 
-    trained(training, report);
-    let mut matrices = Vec::new();
-    for c in &training.confusion {
-        let id = format!("confusion-{}-{}", c.movement + 1, c.property);
-        add_matrix(report, &id, &c.matrix);
-        matrices
-            .push(json!({"id": id, "property": c.property.name(), "movement": &names[c.movement]}));
-    }
-    add_matrix(report, "confusion-geometric-mean", &training.geometric_mean);
-    let most_useful = &training.geometric_mean_most_useful;
-    add_matrix(report, "confusion-geometric-mean-most-useful", most_useful);
-
     let fig8 = MOST_USEFUL.iter().map(|useful| fig8(training, useful));
     report
         .figures
@@ -82,39 +70,19 @@ pub(super) fn add(training: &Training, report: &mut Report) -> Result<(), DrawEr
     let changed = skin.changed_before.iter().map(|t| format!("T{}", t.number));
     let textures = training.textures.iter();
     let names: Vec<String> = textures.map(|t| t.texture.name.to_string()).collect();
-    let words = json!({"names": names, "slides": training.textures.len() * training.movements.len() * TRIALS as usize, "between_movements": training.between_movements.map(|c| format!("{c:.2}")), "white": SHADES[0].to_string(), "black": SHADES[4].to_string(), "pairs_confused": training.pairs_confused, "changed": changed.collect::<Vec<_>>(), "changed_at": format!("{:.0}", skin.changed_at), "paper_changes": skin.paper_changes, "matrices": matrices});
+    let words = json!({
+        "names": names,
+        "slides": training.textures.len() * training.movements.len() * TRIALS as usize,
+        "between_movements": training.between_movements.map(|c| format!("{c:.2}")),
+        "white": SHADES[0].to_string(),
+        "black": SHADES[4].to_string(),
+        "pairs_confused": training.pairs_confused,
+        "changed": changed.collect::<Vec<_>>(),
+        "changed_at": format!("{:.0}", skin.changed_at),
+        "paper_changes": skin.paper_changes,
+    });
     report.words.insert("training", words);
     Ok(())
-}
-
-/// Adds the file of a matrix over all textures.
-fn add_matrix(report: &mut Report, id: &str, of: &[Vec<f32>]) {
-    let header = (1..=of.len()).map(|n| format!("T{n}")).collect();
-    let rows = of
-        .iter()
-        .map(|row| row.iter().map(|&c| (c, 3).into()).collect());
-    report.file(id, header, rows.collect());
-}
-
-/// Adds the file of what was learned of every texture.
-fn trained(training: &Training, report: &mut Report) {
-    let mut header = owned(&["texture", "name"]);
-    for m in 1..=training.movements.len() {
-        for property in Property::ALL {
-            header.extend([format!("{property} {m} mean"), format!("{property} {m} sd")]);
-        }
-    }
-    header.extend(owned(&["ridges lost before, %", "after, %", "new skin"]));
-    let mut rows = Rows::new();
-    for t in &training.textures {
-        let mut row = cells![t.texture.number, t.texture.name];
-        for (mean, sd) in t.gaussians.iter().flatten() {
-            row.extend(cells![(*mean, 4), (*sd, 4)]);
-        }
-        row.extend(cells![(t.wear.0, 2), (t.wear.1, 2), t.new_skin]);
-        rows.push(row);
-    }
-    report.file("trained-properties", header, rows);
 }
 
 /// A property of all slides at the movement that is most useful for it.
@@ -190,7 +158,7 @@ fn wear(training: &Training) -> Result<Figure, DrawError> {
     .figure("skin-during-training")
 }
 
-/// What wear does to roughness, by movement.
+/// Effect of wear on roughness, by movement.
 fn roughness(training: &Training) -> Result<Figure, DrawError> {
     let mut series = Vec::new();
     for (m, &movement) in training.movements.iter().enumerate() {

@@ -13,7 +13,7 @@ pub const PAC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 2.16;
 pub const PDC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 21.8 * 1000.0;
 /// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
 pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
-/// Noise of P_AC, Pa rms (PAPER: 1.2 mV; it says 0.52 Pa).
+/// Noise of P_AC, Pa rms (PAPER: 1.2 mV, given there as 0.52 Pa).
 pub const PAC_NOISE_PA: f64 = 0.52;
 /// Noise of P_AC in recordings of real devices, counts rms (OUT: 4.5 to 5.1).
 pub const PAC_NOISE_FIELD_COUNTS: f64 = 4.8;
@@ -29,15 +29,15 @@ const PDC_NOISE: f64 = 0.3;
 /// Highest count of 12 bits.
 const FULL: f64 = 4095.0;
 
-/// P_DC's rest follows the temperature of the finger, about a value of that finger (OUT: three fingers, each steady): its
-/// deviation, counts, and the times, s, over which the air wanders and the finger follows. Chosen.
+/// P_DC's rest follows the temperature of the finger, about a value of that finger (OUT: three fingers, each steady):
+/// its deviation, counts, and the times, s, over which the air wanders and the finger follows. Chosen.
 const DRIFT_COUNTS: f64 = 2.0;
 const AIR_S: f64 = 600.0;
 const WARM_S: f64 = 60.0;
 /// Ticks from one step of the drift to the next: 10 ms.
 const DRIFT_TICKS: u32 = TICKS_PER_S / 100;
 
-/// The amplifiers and what they remember.
+/// The amplifiers and their state.
 pub(in super::super) struct Amplifiers {
     pac_rest: f64,
     pac_noise_pa: f64,
@@ -46,7 +46,7 @@ pub(in super::super) struct Amplifiers {
     air: f64,
     warm: f64,
     drift_in: u32,
-    /// gain of P_DC relative to a sound amplifier's, and what is left of it after a tick (faults)
+    /// gain of P_DC relative to a sound amplifier's, and its factor per tick (faults)
     pdc_gain: f64,
     pdc_kept: f64,
     high_pass: HighPass,
@@ -128,7 +128,7 @@ impl Amplifiers {
         self.pac_noise_pa / PAC_PA_PER_COUNT * noise.normal()
     }
 
-    /// What the converter makes of a P_AC so far from its rest, counts, and whether that had to be cut.
+    /// Reading of the converter at a P_AC so far from its rest, counts, and true if it was cut.
     pub(super) fn convert_pac(&self, about_rest: f64) -> (u16, bool) {
         let value = self.pac_rest.round() + about_rest;
         (counts(value), !(0.0..=FULL).contains(&value))
@@ -143,7 +143,7 @@ pub(super) fn between([a, b]: [f64; 2], fraction: f64) -> f64 {
     a + (b - a) * fraction.clamp(0.0, 1.0)
 }
 
-/// What the converter makes of it.
+/// Reading of the converter.
 fn counts(value: f64) -> u16 {
     value.round().clamp(0.0, FULL) as u16
 }

@@ -1,17 +1,18 @@
 //! A piezo disc behind the skin with two amplifiers, and a load cell with one, as voltages before a converter.
 //!
-//! A disc gives charge for a change of force; with the amplifier's input that is a high-pass. It says more when it is loaded, since
-//! the skin then covers more of it, and its charge drifts with warmth (pyroelectricity), which the high-pass takes away.
+//! A disc gives charge for a change of force; with the amplifier's input that is a high-pass. It gives more when it is
+//! loaded, since the skin then covers more of it, and its charge drifts with warmth (pyroelectricity), which the
+//! high-pass takes away.
 
 use super::amplifier::{HighPass, LowPass, between};
 use super::cell::Cell;
-use super::felt::Felt;
+use super::stimulus::Stimulus;
 use crate::noise::Noise;
 
 /// Supply of bridge and converter, V.
 pub(super) const SUPPLY_V: f64 = 3.3;
-/// Voltage of P_AC for each newton within its band: the paper's second gain of 99.1 above 0.0701 V/N (chosen, so that its counts are
-/// a BioTac's).
+/// Voltage of P_AC for each newton within its band: the paper's second gain of 99.1 above 0.0701 V/N (chosen, so that
+/// its counts are a BioTac's).
 pub(super) const PAC_V_PER_N: f64 = 99.1 * SUPPLY_V / 4096.0 / 0.0115;
 /// Its upper corner, Hz; the lower one is the high-pass's 10 Hz.
 const UPPER_HZ: f64 = 1040.0;
@@ -61,13 +62,13 @@ impl Analog {
         &mut self.cell
     }
 
-    pub(super) fn tick(&mut self, felt: &Felt, noise: &mut Noise) {
-        self.cell.tick(felt, noise);
+    pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
+        self.cell.tick(stimulus, noise);
         self.pyro_v += PYRO_V_PER_S * crate::conditions::TICK_S * noise.white()[1];
-        let loaded = 1.0 + LOADED_PER_N * felt.force_n;
+        let loaded = 1.0 + LOADED_PER_N * stimulus.force_n;
         // the skin in front of the disc has a mass: what shakes the mounting presses it on the disc
-        let shaken_n = SKIN_KG * 9.806_65 * felt.held.acceleration_g;
-        let force_n = felt.force_n + felt.vibration_n + shaken_n;
+        let shaken_n = SKIN_KG * 9.806_65 * stimulus.held.acceleration_g;
+        let force_n = stimulus.force_n + stimulus.vibration_n + shaken_n;
         let volts = PAC_V_PER_N * loaded * force_n + self.pyro_v;
         let band = self.low_pass.tick(self.high_pass.tick(volts));
         self.pac_v = [self.pac_v[1], self.offset_v + band];

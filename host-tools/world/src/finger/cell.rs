@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::felt::Felt;
+use super::stimulus::Stimulus;
 use crate::conditions::{TICK_S, TICKS_PER_S};
 use crate::noise::Noise;
 
@@ -12,13 +12,15 @@ const RATIO_PER_N: f64 = 1e-3 / 9.806_65;
 const ZERO_SHARE: f64 = 0.065;
 /// The tip weighs 10 g, N.
 const TIP_N: f64 = 0.098;
-/// The tip on the bar: 0.4 mm at 1 kg (usual) are 25 kN/m, with 10 g 250 Hz; damping of glued silicone and foam (chosen).
+/// The tip on the bar: 0.4 mm at 1 kg (usual) are 25 kN/m, with 10 g 250 Hz; damping of glued silicone and foam
+/// (chosen).
 const RESONANCE_HZ: f64 = 250.0;
 const DAMPING: f64 = 0.15;
 /// A bar feels this share of a force across it (chosen; makers promise some per cent).
 const ACROSS: f64 = 0.02;
-/// Its zero drifts with temperature: deviation, N, and the time in which it wanders, s. A degree (chosen) is 1 mN for a bar of 0.1 % of
-/// its range in 10 degrees (usual), and 6 mN for an INA125 of 2 uV a degree; an ADS1220 adds less than a tenth of that.
+/// Its zero drifts with temperature: deviation, N, and the time in which it wanders, s. A degree (chosen) is 1 mN for a
+/// bar of 0.1 % of its range in 10 degrees (usual), and 6 mN for an INA125 of 2 uV a degree; an ADS1220 adds less than
+/// a tenth of that.
 const DRIFT_N: f64 = 0.006;
 const DRIFT_S: f64 = 600.0;
 
@@ -30,7 +32,7 @@ pub(in super::super) struct Cell {
     /// Force in the spring, N, and its rate.
     spring_n: f64,
     rate: f64,
-    /// What a newton gives, of what it should; below 0 where wires are exchanged.
+    /// Response to a newton, relative to a sound cell's; below 0 where wires are exchanged.
     gain: f64,
     /// The output, share of the supply, at the last two ticks.
     ratio: [f64; 2],
@@ -49,17 +51,17 @@ impl Cell {
         }
     }
 
-    /// What a newton gives from now on, of what it should.
+    /// Sets the response to a newton, relative to a sound cell's.
     pub(super) fn set_gain(&mut self, gain: f64) {
         self.gain = gain;
     }
 
-    pub(super) fn tick(&mut self, felt: &Felt, noise: &mut Noise) {
+    pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
         let kick = DRIFT_N * (2.0 * TICK_S / DRIFT_S).sqrt();
         self.drift_n += kick * noise.white()[0] - self.drift_n * TICK_S / DRIFT_S;
         // what presses up is positive, the tip's weight and its inertia are not
-        let weight_n = TIP_N * (felt.held.down + felt.held.acceleration_g);
-        let load_n = felt.force_n + felt.vibration_n + ACROSS * felt.shear_n - weight_n;
+        let weight_n = TIP_N * (stimulus.held.down + stimulus.held.acceleration_g);
+        let load_n = stimulus.force_n + stimulus.vibration_n + ACROSS * stimulus.shear_n - weight_n;
         let omega = TAU * RESONANCE_HZ;
         self.rate +=
             TICK_S * omega * (omega * (load_n - self.spring_n) - 2.0 * DAMPING * self.rate);

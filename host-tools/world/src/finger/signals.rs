@@ -1,13 +1,13 @@
-//! From what a contact does to a fingertip to what its transducers say: one for each kind of finger.
+//! From the effects of a contact on a fingertip to the signals of its transducers: one for each kind of finger.
 
 use super::amplifier::{Amplifiers, PA_PER_N};
 use super::analog::Analog;
-use super::felt::Felt;
 use super::mems::Mems;
+use super::stimulus::Stimulus;
 use crate::noise::Noise;
 
-/// Pressure that the mounting's acceleration makes in a fluid, Pa for a g: a column of 10 mm of water. The lever's vibration is known
-/// as such a pressure.
+/// Pressure that the mounting's acceleration makes in a fluid, Pa for a g: a column of 10 mm of water. The lever's
+/// vibration is known as such a pressure.
 pub(in super::super) const FLUID_PA_PER_G: f64 = 98.0;
 
 /// The transducers.
@@ -22,11 +22,11 @@ pub(in super::super) enum Signals {
 }
 
 impl Signals {
-    pub(super) fn tick(&mut self, felt: &Felt, noise: &mut Noise) {
+    pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
         match self {
-            Self::Fluid(amplifiers) => amplifiers.tick(felt.fluid_pa, felt.slow_pa, noise),
-            Self::Analog(analog) => analog.tick(felt, noise),
-            Self::Mems(mems) => mems.tick(felt, noise),
+            Self::Fluid(amplifiers) => amplifiers.tick(stimulus.fluid_pa, stimulus.slow_pa, noise),
+            Self::Analog(analog) => analog.tick(stimulus, noise),
+            Self::Mems(mems) => mems.tick(stimulus, noise),
         }
     }
 }

@@ -11,8 +11,8 @@ const FLUID_N: f64 = 1.0;
 const CORE_MM: f64 = 1.587;
 /// Stiffness on the core, N/mm^1.5. Chosen: the slope of P_DC over force falls to a third within a newton.
 const CORE_N: f64 = 4.0;
-/// Part of the elastic force that the silicone adds when pressed fast and that relaxes (chosen; without fluid pressure, so
-/// that loading and unloading differ in fig. 3).
+/// Part of the elastic force that the silicone adds when pressed fast and that relaxes (chosen; without fluid pressure,
+/// so that loading and unloading differ in fig. 3).
 const RELAXING: f64 = 0.03;
 /// Time of that, s (chosen).
 const RELAX_S: f64 = 1.5;

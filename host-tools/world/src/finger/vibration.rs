@@ -1,9 +1,9 @@
-//! What sliding makes of a surface: vibrations, and how the fluid carries them.
+//! The vibrations that sliding over a surface makes, and their way through the fluid.
 //!
-//! Three sources. The ridges follow the surface up and down: a spatial filter over the contact patch, which gives lines at
-//! v/lambda (eq. 17) and tells coarse from fine. Asperities too fine to be followed catch and release: impulses, more of
-//! them the faster it goes, that excite the resonance of the fluid whatever the speed. And friction itself fluctuates,
-//! with a 1/f spectrum, in proportion to the shear (PAPER after Wiertlewski 2011).
+//! Three sources. The ridges follow the surface up and down: a spatial filter over the contact patch, which gives lines
+//! at v/lambda (eq. 17) and distinguishes coarse from fine. Asperities too fine to be followed catch and release:
+//! impulses, more of them the faster it goes, that excite the resonance of the fluid at any speed. And friction itself
+//! fluctuates, with a 1/f spectrum, in proportion to the shear (PAPER after Wiertlewski 2011).
 
 use std::f64::consts::TAU;
 
@@ -22,8 +22,8 @@ const PATCH_MAX_MM: f64 = 3.4;
 /// Vibrations with the ridges gone, relative to new (chosen; PAPER: ridges "greatly enhance" them).
 const WITHOUT_RIDGES: f64 = 0.3;
 
-/// Impulses of unresolved asperities: Pa for each um of height and each root of an asperity in a millisecond, as noise of
-/// one value a tick (chosen, for the levels of P_AC that sliding fingers show).
+/// Impulses of unresolved asperities: Pa for each um of height and each root of an asperity in a millisecond, as noise
+/// of one value a tick (chosen, for the levels of P_AC that sliding fingers show).
 const IMPULSE_PA: f64 = 70.0;
 /// Relative bandwidth of an impulse, which goes up and down again (chosen).
 const IMPULSE_WIDTH: f64 = 1.25;
@@ -31,12 +31,12 @@ const IMPULSE_WIDTH: f64 = 1.25;
 const IMPULSES_PER_MS: f64 = 1.5;
 /// Fluctuations of friction grow with speed to this power (chosen).
 const FRICTION_SPEED_POWER: f64 = 0.5;
-/// They average out over the contact, relative to friction: as its length, the root of its area. The texture's are those at
-/// 0.2 N, with a patch of this half length, mm.
+/// They average out over the contact, relative to friction: as its length, the root of its area. The texture's are
+/// those at 0.2 N, with a patch of this half length, mm.
 const FRICTION_PATCH_MM: f64 = 1.46;
 
-/// Resonance of the fluid at rest and its rise with the root of force, Hz and Hz/N^0.5: 200 to 350 Hz from 0 to 2 N (PAPER:
-/// 200-350 Hz).
+/// Resonance of the fluid at rest and its rise with the root of force, Hz and Hz/N^0.5: 200 to 350 Hz from 0 to 2 N
+/// (PAPER: 200-350 Hz).
 const RESONANCE_HZ: (f64, f64) = (200.0, 106.0);
 /// Its damping ratio at rest, and its rise with force, 1/N (chosen).
 const RESONANCE_DAMPING: (f64, f64) = (0.22, 0.08);
@@ -77,13 +77,13 @@ pub(super) struct Vibrations {
     drag: f64,
     /// half length of the patch, mm
     patch_mm: f64,
-    /// how far the surface comes at a place, um, with a half length of the patch, mm, and so worn a skin: a sum over the
-    /// patch, and the same while the finger is still
+    /// displacement by the surface at a place, um, with a half length of the patch, mm, and so worn a skin: a sum over
+    /// the patch, and the same while the finger is still
     contact_um: Option<([f64; 3], f64)>,
 }
 
 impl Vibrations {
-    /// How far the patch follows the surface at `x_mm`, um. `amplitude` is that of this touch.
+    /// Displacement of the patch by the surface at `x_mm`, um. `amplitude` is that of this touch.
     pub(super) fn follow_um(
         &mut self,
         surface: &Surface,
@@ -116,8 +116,8 @@ impl Vibrations {
         self.patch_mm.clamp(RIDGE_MM, PATCH_MAX_MM)
     }
 
-    /// Pressure of impulses and friction while sliding at `speed` (mm/s; 0 while it sticks) against `shear_n`, Pa; after
-    /// [`follow_um`](Self::follow_um).
+    /// Pressure of impulses and friction while sliding at `speed` (mm/s; 0 while it sticks) against `shear_n`, Pa;
+    /// after [`follow_um`](Self::follow_um).
     pub(super) fn sliding_pa(
         &mut self,
         surface: &Surface,

@@ -339,7 +339,7 @@ fn lost_steps_and_a_runaway_show_in_the_tip_alone() {
     bench.wait_ms(1_000);
     let down = from - bench.lever.height_mm();
     assert!((down - 0.5).abs() < 3e-3, "{down}");
-    // asked to go up twice as fast, it gives in when more was asked for than it did
+    // commanded to go up twice as fast, it gives in after more steps than it made
     bench.turn_to(false);
     bench.steps(1_700, 1_600.0);
     let turned = bench.lever.height_mm();

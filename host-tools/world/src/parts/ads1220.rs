@@ -1,5 +1,5 @@
-//! TI's ADS1220 by its data sheet SBAS501: commands and registers of 8.5 and 8.6, timing of 6.6, conversion modes of 8.4.2. What I could
-//! not read there is marked "chosen".
+//! TI's ADS1220 by its data sheet SBAS501: commands and registers of 8.5 and 8.6, timing of 6.6, conversion modes of
+//! 8.4.2. What I could not read there is marked "chosen".
 
 use super::bus::{ClockMode, FLOATING, Late};
 use crate::noise::Noise;
@@ -20,7 +20,7 @@ const SUPPLY_V: f64 = 3.3;
 const INTERNAL_V: f64 = 2.048;
 const FULL: f64 = 8_388_607.0;
 
-/// What the bytes of this select are.
+/// The meaning of this select's bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Says {
     Command,
@@ -37,7 +37,7 @@ pub struct Ads1220 {
     clock: f64,
     ready_ns: u64,
     wire_cut: bool,
-    /// A conversion under way: when it began and ends; what it has summed up, and the time of that.
+    /// A conversion under way: its begin and end; its sum so far, and the time of that.
     converts: Option<(u64, u64)>,
     sum: (f64, f64),
     tick_ns: u64,
@@ -147,7 +147,7 @@ impl Ads1220 {
         let reference = match self.registers[2] >> 6 {
             3 => SUPPLY_V,
             0 => INTERNAL_V,
-            // nothing is wired to REFP and REFN: it says its end (chosen)
+            // nothing is wired to REFP and REFN: it reads full scale (chosen)
             _ => return FULL as i32,
         };
         // AIN0 - AIN1 is where the cell is; of the others nothing is known here
@@ -163,8 +163,8 @@ impl Ads1220 {
             .clamp(-FULL - 1.0, FULL) as i32
     }
 
-    /// Chip select falls: a new command (8.5.1.1). Only mode 1 works: DIN is taken as the clock falls (8.5.1); in modes 0 and 3 it
-    /// is taken half a clock late, so that both lines come a bit late (chosen); in mode 2, as in mode 1.
+    /// Chip select falls: a new command (8.5.1.1). Only mode 1 works: DIN is taken as the clock falls (8.5.1); in modes
+    /// 0 and 3 it is taken half a clock late, so that both lines come a bit late (chosen); in mode 2, as in mode 1.
     pub fn select(&mut self, now_ns: u64, mode: ClockMode) {
         self.heard = now_ns >= self.ready_ns;
         self.wrong_phase = mode.on_rising().then(Late::default);

@@ -1,6 +1,6 @@
 //! The bus as a part has it.
 
-/// MISO with nobody driving it, by its pull-up.
+/// MISO while no part drives it, by its pull-up.
 pub(super) const FLOATING: u8 = 0xFF;
 
 /// Polarity and phase of the clock, as the bus's master has them.
@@ -35,12 +35,12 @@ pub(super) struct Late {
 }
 
 impl Late {
-    /// What the part hears of a byte.
+    /// The byte as the part gets it.
     pub(super) fn hear(&mut self, mosi: u8) -> u8 {
         u8::from(std::mem::replace(&mut self.mosi, mosi & 1 != 0)) << 7 | mosi >> 1
     }
 
-    /// What the master hears of the part's byte.
+    /// The part's byte as the master gets it.
     pub(super) fn say(&mut self, miso: u8) -> u8 {
         u8::from(std::mem::replace(&mut self.miso, miso & 1 != 0)) << 7 | miso >> 1
     }

@@ -1,5 +1,5 @@
-//! ST's IIS3DWB: its registers as the public header iis3dwb_reg.h lists them, its bus and its signal chain as the data sheet DS12569
-//! and the application note AN5444 describe them; what I could not read there is marked "chosen".
+//! ST's IIS3DWB: its registers as the public header iis3dwb_reg.h lists them, its bus and its signal chain as the data
+//! sheet DS12569 and the application note AN5444 describe them; what I could not read there is marked "chosen".
 
 use super::bus::{ClockMode, FLOATING};
 use crate::conditions::{TICK_S, TICKS_PER_S};
@@ -8,7 +8,7 @@ use crate::noise::Noise;
 
 /// From power-up to the first register that can be read, ns (ST's examples wait 10 ms).
 pub const BOOT_NS: u64 = 10_000_000;
-/// How long a software reset takes, ns (AN5444: 50 us).
+/// Duration of a software reset, ns (AN5444: 50 us).
 const RESET_NS: u64 = 50_000;
 /// From power-on of the measurement to data, ns (chosen: 10 ms, AN5444 speaks of samples to discard).
 const TURN_ON_NS: u64 = 8_000_000;
@@ -52,22 +52,23 @@ pub struct Iis3dwb {
     noise: Noise,
     /// Share that its clock is off by.
     clock: f64,
-    /// Share that its scale is off by, and what it says at 0, g: pieces differ (how far could not be read in DS12569).
+    /// Error of its scale, as a share, and its reading at 0, g: pieces differ (how far could not be read in DS12569).
     scale: (f64, f64),
     powered_ns: u64,
     on_since_ns: Option<u64>,
     resets_until_ns: u64,
-    /// The signal chain: a low-pass of second order and its corner, Hz; g at the last two ticks, and when the last one was.
+    /// The signal chain: a low-pass of second order and its corner, Hz; g at the last two ticks, and when the last one
+    /// was.
     corner_hz: f64,
     low_pass: LowPass,
     chain: [f64; 2],
     tick_ns: u64,
-    /// What is latched in OUTZ, LSB.
+    /// Latched value of OUTZ, LSB.
     out: i16,
     /// Of this select: bits come late, the address once it is known, and whether it is written.
     heard: bool,
     address: Option<(u8, bool)>,
-    /// Writes to bits that have to stay as they are.
+    /// Writes to bits that must not change.
     complaints: u64,
 }
 
@@ -197,8 +198,8 @@ impl Iis3dwb {
         (g / (LSB_G * range)).round().clamp(-32_768.0, 32_767.0) as i16
     }
 
-    /// Chip select falls. SDI is taken as the clock rises, in modes 0 and 3 (chosen: DS12569 draws mode 3 only); in the others it
-    /// changes just then, and the address is nonsense (chosen: nothing is answered, nothing written).
+    /// Chip select falls. SDI is taken as the clock rises, in modes 0 and 3 (chosen: DS12569 draws mode 3 only); in the
+    /// others it changes just then, and the address is nonsense (chosen: nothing is answered, nothing written).
     pub fn select(&mut self, now_ns: u64, mode: ClockMode) {
         self.heard = mode.on_rising()
             && now_ns >= self.powered_ns + BOOT_NS

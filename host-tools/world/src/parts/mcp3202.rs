@@ -5,7 +5,7 @@ use super::bus::{ClockMode, FLOATING};
 /// Highest reading of 12 bits.
 pub const FULL: u16 = 4095;
 
-/// Where a conversion is.
+/// The stage of a conversion.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum State {
     /// Before the start bit.
@@ -36,8 +36,8 @@ impl Mcp3202 {
         self.unplugged = true;
     }
 
-    /// Chip select falls. Modes 0 and 3 work (features: "modes 0,0 and 1,1"); in the others DIN changes as it is taken, and no
-    /// start bit is where it should be (chosen: none is heard).
+    /// Chip select falls. Modes 0 and 3 work (features: "modes 0,0 and 1,1"); in the others DIN changes as it is taken,
+    /// and no start bit is where it should be (chosen: none is heard).
     pub fn select(&mut self, mode: ClockMode) {
         self.on = mode.on_rising() && !self.unplugged;
         self.state = State::Waits;
@@ -58,7 +58,7 @@ impl Mcp3202 {
         })
     }
 
-    /// A clock: DIN is taken while it rises; what is on DOUT then was put there as it fell before.
+    /// A clock: DIN is taken while it rises; the level of DOUT then was set as it fell before.
     fn bit(&mut self, din: bool, sample: &mut impl FnMut(u8) -> u16) -> bool {
         match self.state {
             State::Waits => {
@@ -70,7 +70,8 @@ impl Mcp3202 {
             }
             State::Configured(bits) => {
                 self.config = self.config << 1 | u8::from(din);
-                // the sample is taken from the second rising edge after the start bit on, and ends within the third (5.1)
+                // the sample is taken from the second rising edge after the start bit on, and ends within the third
+                // (5.1)
                 if bits == 1 {
                     self.reading = if self.config & 0b10 != 0 {
                         sample(self.config & 1)

@@ -1,4 +1,5 @@
-//! The parts on their own bus: words worked out by hand from the data sheets, and what each does when it is used wrongly.
+//! The parts on their own bus: words worked out by hand from the data sheets, and what each does when it is used
+//! wrongly.
 
 use super::ads1220::Ads1220;
 use super::iis3dwb::{BOOT_NS, Iis3dwb};
@@ -26,7 +27,7 @@ fn an_mcp3202_converts_in_modes_0_and_3() {
         };
         let (first, second) = (read([0x01, 0xA0, 0x00]), read([0x01, 0xE0, 0x00]));
         if number == 0 || number == 3 {
-            // figure 6-1: three bits that nobody drives, the null bit, twelve bits
+            // figure 6-1: three bits that no part drives, the null bit, twelve bits
             assert_eq!(first, [0xFF, 0xEA, 0x5C]);
             assert_eq!(second, [0xFF, 0xEA, 0x5D]);
         } else {

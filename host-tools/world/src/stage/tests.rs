@@ -176,7 +176,8 @@ fn current_has_ripple_of_the_commutation() {
 
 #[test]
 fn energy_is_accounted_for() {
-    // electrical energy = heat in the winding + friction + kinetic energy, over a start, a run and a short-circuit brake
+    // electrical energy = heat in the winding + friction + kinetic energy, over a start, a run and a short-circuit
+    // brake
     let mut stage = stage_at(10.0);
     let (mut put_in, mut heat, mut friction) = (0.0, 0.0, 0.0);
     for (duty, seconds) in [(0.2, 0.3), (0.0, 0.03)] {
@@ -273,7 +274,8 @@ fn noise_of_the_reading_is_what_it_says() {
     assert_eq!(stage.adc(5), stage.adc(5));
 }
 
-/// A bridge that is off while its PWM is low: the current is the integral of V = R i + L di/dt, a diode's way back included.
+/// A bridge that is off while its PWM is low: the current is the integral of V = R i + L di/dt, a diode's way back
+/// included.
 #[test]
 fn fast_decay_gives_the_current_of_its_equation() {
     for (duty, speed_mm_s) in [
@@ -341,7 +343,8 @@ fn fast_decay_coasts_where_slow_decay_brakes() {
     assert_eq!(stage.position_mm(), 40.0);
 }
 
-/// As often as the screw's turns and the commutation come past, as far as was said, and not at all at rest.
+/// The vibration has the periods of the screw's turns and of the commutation, the commanded amplitude, and is 0 at
+/// rest.
 #[test]
 fn a_vibration_has_its_amplitude_and_its_frequencies() {
     let mut stage = plain();

@@ -1,4 +1,5 @@
-//! The bench on which the world is observed: a finger pressed and slid by hand, and an analysis of its signals of its own.
+//! The bench on which the world is observed: a finger pressed and slid by hand, and an analysis of its signals of its
+//! own.
 
 use std::f64::consts::TAU;
 
@@ -22,8 +23,8 @@ const ONSET_MM: f64 = 4.0;
 const STEADY_MM: f64 = 50.0;
 const STEADY_S: f64 = 1.0;
 
-/// A locked stepper motor: three tones in the fluid, other ones for each slide (PAPER: its noise differs from trial to trial).
-/// About the amplifier's own noise; chosen.
+/// A locked stepper motor: three tones in the fluid, other ones for each slide (PAPER: its noise differs from trial to
+/// trial). About the amplifier's own noise; chosen.
 struct Hum([(f64, f64, f64); 3]);
 
 impl Hum {
@@ -45,7 +46,7 @@ impl Hum {
     }
 }
 
-/// A slide as it was sampled and as it was.
+/// A slide as it was sampled, and its ground truth.
 pub(super) struct Slide {
     /// P_AC in counts while pressed and still, and while sliding
     pub(super) background: Vec<f64>,
@@ -132,7 +133,7 @@ impl Slide {
     pub(super) fn properties(&self) -> Properties {
         let spectrum = spectrum(&self.pac);
         let background = band(&self::spectrum(&self.background), 20.0, 700.0);
-        // what is left of noise by chance counts as a hundredth of the noise
+        // the rest of noise by chance counts as a hundredth of the noise
         let power = (band(&spectrum, 20.0, 700.0) - background).max(0.01 * background);
         Properties {
             traction: self.shear_n,

@@ -1,4 +1,5 @@
-//! One vibration and one force through every finger's transducers, parts, wire and decoder: what comes out agrees.
+//! Tests that one vibration and one force through every finger's transducers, parts, wire and decoder give the same
+//! result.
 
 use std::f64::consts::TAU;
 
@@ -6,12 +7,12 @@ use tactus_core::sensor::pressure::{Channel, SLOTS_HZ};
 use tactus_core::sensor::{FingerModel, FingerName};
 
 use crate::conditions::TICK_S;
-use crate::finger::{Felt, Finger, Held, PA_PER_N};
+use crate::finger::{Finger, Held, PA_PER_N, Stimulus};
 use crate::parts::Peers;
 use crate::slot::Reader;
 
-/// What comes out: counts of P_AC and of P_DC with the times of their slots, s since the signal began.
-type Heard = [Vec<(f64, f64)>; 2];
+/// The decoder's output: counts of P_AC and of P_DC with the times of their slots, s since the signal began.
+type Decoded = [Vec<(f64, f64)>; 2];
 
 /// A finger on its bus, without a contact, that feels this force and this vibration, N, at each time, s.
 struct Wire {
@@ -41,7 +42,7 @@ impl Wire {
             self.ticks += 1;
             let at_s = self.ticks as f64 * TICK_S;
             let [force_n, vibration_n] = signal(at_s - BEFORE_S);
-            self.finger.feed(&Felt {
+            self.finger.feed(&Stimulus {
                 fluid_pa: PA_PER_N * vibration_n,
                 slow_pa: PA_PER_N * force_n,
                 force_n,
@@ -54,7 +55,7 @@ impl Wire {
         (now_s / TICK_S).fract()
     }
 
-    fn hear(mut self, seconds: f64, signal: impl Fn(f64) -> [f64; 2]) -> Heard {
+    fn hear(mut self, seconds: f64, signal: impl Fn(f64) -> [f64; 2]) -> Decoded {
         let mut reader = self.reader.clone();
         let mut transact = |begins_ns: u64, part, mode, mosi: &[u8], miso: &mut [u8]| {
             let fraction = self.advance(1e-9 * begins_ns as f64, &signal);
@@ -76,7 +77,7 @@ impl Wire {
                 transact(transfer.begins_ns, transfer.part, transfer.mode, mosi, miso);
             })
             .unwrap();
-        let mut heard = Heard::default();
+        let mut heard = Decoded::default();
         for n in 0..((BEFORE_S + seconds - 0.15) * f64::from(SLOTS_HZ)) as u64 {
             let at_s = 0.15 + n as f64 / f64::from(SLOTS_HZ);
             let word = reader.word_of_slot(n, (1e9 * at_s) as u64, |transfer, mosi, miso| {
@@ -122,10 +123,10 @@ fn tone(name: FingerName, hz: f64, counts: f64) -> (f64, f64) {
 /// Tones with whole periods in half a second, Hz: those of the band, and of its ends.
 const TONES_HZ: [f64; 7] = [30.0, 60.0, 120.0, 240.0, 400.0, 560.0, 700.0];
 const ENDS_HZ: [f64; 4] = [10.0, 20.0, 850.0, 1000.0];
-/// When the force steps from 0 to 1 N, s.
+/// Time when the force steps from 0 to 1 N, s.
 const STEP_S: f64 = 0.5;
 
-/// How a vibration comes out of a finger.
+/// A vibration behind a finger.
 struct Vibration {
     name: FingerName,
     /// Frequency, Hz, gain, dB, and phase in radians without that of the high-pass, going on from the one before.

@@ -120,7 +120,7 @@ fn ten_textures_are_as_the_paper_describes_them() {
         assert!(rank(traction, 46) <= 2 && rank(traction, 47) <= 2);
         // polished aluminum is the least rough, rubber smooth
         assert!(rank(roughness, 46) >= 8 && rank(roughness, 47) >= 7);
-        // graphite and satin have higher centroids than burlap and velcro, and than what has no features
+        // graphite and satin have higher centroids than burlap and velcro, and than textures without features
         for fine in [43, 84] {
             assert!(
                 [10, 100, 46, 47]
@@ -191,8 +191,8 @@ fn traction_is_best_felt_slow_and_heavy_and_roughness_fast_and_light() {
 
 #[test]
 fn rougher_textures_have_less_traction() {
-    // Table 3: correlations over all textures, by movement: traction and roughness, traction and fineness, roughness and
-    // fineness
+    // Table 3: correlations over all textures, by movement: traction and roughness, traction and fineness, roughness
+    // and fineness
     const MOVEMENTS: [(f64, f64); 3] = [(1.26, 10.0), (0.5, 25.1), (0.2, 63.1)];
     const PAPER: [[f64; 3]; 3] = [
         [-0.5564, -0.3560, 0.2183],

@@ -98,7 +98,7 @@ fn an_answer_read_too_early_is_an_error_frame() {
 #[test]
 fn wrong_commands_get_the_error_that_names_them() {
     let mut bus = Bus::new();
-    // channel 5 is none
+    // there is no channel 5
     assert_eq!(bus.ask([0x8A, 0], GAP_NS, 2), [0xA5, 0x58]);
     // 0x81: bad parity
     assert_eq!(bus.ask([0x81, 0], GAP_NS, 2), [0xA5, 0x45]);

@@ -149,7 +149,7 @@ fn friction_depends_on_speed_load_and_place() {
 
 #[test]
 fn the_mean_force_of_a_slide_is_that_of_the_press() {
-    // nobody adjusts it (PAPER); what is left is the start on a crest or in a valley, and relaxation
+    // nobody adjusts it (PAPER); what remains is the start on a crest or in a valley, and relaxation
     let mut finger = Finger::new(1);
     let mut errors: Vec<(f64, u8)> = (1..=117)
         .step_by(2)
@@ -173,7 +173,7 @@ fn gratings_give_lines_at_v_over_lambda_and_its_harmonics() {
         wavelength_mm: 1.3,
         ..texture.weave.unwrap()
     });
-    // load and speed do what they do on an ordinary texture
+    // the laws of load and speed are those of an ordinary texture
     (texture.vibration_speed, texture.vibration_bend) = (0.0, 0.0);
     (texture.impulse_load, texture.impulse_bend) = (0.0, 0.0);
     texture.clamped_n = 0.6;

@@ -1,4 +1,5 @@
-//! Median parameters of the textures: of each group, and of single textures about which the paper or the name says more.
+//! Median parameters of the textures: of each group, and of single textures about which the paper or the name tells
+//! more.
 //!
 //! All are chosen. Heights are rms in um, lengths in mm.
 
@@ -29,7 +30,7 @@ pub(super) struct Recipe {
     pub(super) damping: f64,
     /// Thickness.
     pub(super) thickness_mm: f64,
-    /// How much it gives way.
+    /// Compliance.
     pub(super) compliance_mm_per_n: f64,
 }
 
@@ -37,8 +38,12 @@ pub(super) struct Recipe {
 #[rustfmt::skip]
 fn of(group: Group) -> Recipe {
     use Group::*;
-    //   friction, fine um, mm, Hz, relief um, mm, weave um, mm, friction noise, heterogeneity, damping, thickness, compliance
-    let (friction, fine, impulse_hz, relief, weave, friction_noise, heterogeneity, damping, thickness_mm, compliance_mm_per_n) =
+    //   friction, fine um, mm, Hz, relief um, mm, weave um, mm, friction noise, heterogeneity, damping, thickness,
+    //   compliance
+    let (
+        friction, fine, impulse_hz, relief, weave, friction_noise, heterogeneity, damping, thickness_mm,
+        compliance_mm_per_n,
+    ) =
         match group {
             Paper       => (0.55, (2.0, 0.06),  900.0, ( 4.0, 1.0), ( 0.0, 1.0), 0.0040, 0.06, 0.0,  0.3, 0.02),
             Art         => (0.50, (4.0, 0.08),  500.0, (20.0, 1.5), ( 0.0, 1.0), 0.0053, 0.10, 0.1,  2.0, 0.20),
@@ -58,8 +63,8 @@ fn of(group: Group) -> Recipe {
     // cells are round, grain and fibres are not
     let relief_exponent = if group == Foam { 4.0 } else { 3.0 };
     Recipe {
-        friction, fine, impulse_hz, relief, relief_exponent, weave, grating: false, friction_noise, heterogeneity, damping, thickness_mm,
-        compliance_mm_per_n,
+        friction, fine, impulse_hz, relief, relief_exponent, weave, grating: false, friction_noise, heterogeneity,
+        damping, thickness_mm, compliance_mm_per_n,
     }
 }
 
@@ -78,7 +83,7 @@ pub(super) fn recipe(named: Named) -> (Recipe, bool) {
         11 => Recipe { friction: 0.50, relief: (40.0, 0.8), ..r },
         17 => Recipe { friction: 0.90, fine: (1.5, 0.08), relief: (8.0, 0.8), ..r },
         18 | 19 => Recipe { friction: 0.75, fine: (0.4, 0.05), relief: (1.5, 1.0), ..r },
-        // the grating its name says
+        // the grating in its name
         20 => Recipe { friction: 0.50, fine: (0.8, 0.06), relief: (4.0, 1.0), weave: (40.0, 5.0), grating: true, ..r },
         21 => Recipe { friction: 0.70, fine: (1.0, 0.06), relief: (5.0, 1.0), weave: (12.0, 1.5), grating: true, ..r },
         22 => Recipe { relief: (25.0, 2.0), ..r },

@@ -1,4 +1,4 @@
-//! What breaks in the world, when, and how it is repaired.
+//! Faults in the world, their times, and their repair.
 
 use super::World;
 use crate::faults::{Fault, Faults};
@@ -23,8 +23,8 @@ impl World {
             .sort_by_key(|(at_ns, _)| std::cmp::Reverse(*at_ns));
     }
 
-    /// Repairs everything, and forgets what was scheduled; a sensor that is plugged in again starts up. What a fault has
-    /// done stays: lost steps, lost counts, a lever that ran down.
+    /// Repairs everything, and drops the scheduled faults; a sensor that is plugged in again starts up. The effects of
+    /// a fault stay: lost steps, lost counts, a lever that ran down.
     pub fn clear(&mut self) {
         self.faults = Faults::default();
         self.scheduled.clear();

@@ -1,4 +1,4 @@
-//! What was wrong in a world from the beginning, and what a person does to it before anything moves.
+//! Mistakes in a world from the beginning, and a person's operations before anything moves.
 
 use super::World;
 use crate::faults::Stop;
@@ -6,7 +6,7 @@ use crate::parts::Peers;
 use crate::wiring::Miswired;
 
 impl World {
-    /// Somebody has built it like this. To be called before time passes; mistakes add up.
+    /// Builds a mistake into the rig. To be called before time passes; mistakes add up.
     pub fn miswire(&mut self, mistake: Miswired) {
         self.wires.take(mistake);
         let position_mm = self.stage.position_mm();
@@ -18,7 +18,7 @@ impl World {
         }
     }
 
-    /// What drives the sensor's wires at the chip's MISO and MOSI while it is selected and has no clock.
+    /// Levels at the chip's MISO and MOSI while the sensor is selected and has no clock; `None` if nothing drives them.
     pub fn data_lines(&self) -> [Option<bool>; 2] {
         let plugged = match &self.peers {
             Peers::BioTac(sensor) => sensor.is_plugged(),
@@ -39,28 +39,28 @@ impl World {
         [a_wired.then_some(a), b_wired.then_some(b)]
     }
 
-    /// Somebody pushes the stage by hand to a place, mm from its lower hard stop.
+    /// Pushes the stage by hand to a place, mm from its lower hard stop.
     pub fn push_stage(&mut self, to_mm: f64) {
         self.stage.push(to_mm);
     }
 
-    /// Somebody puts a resistor of so many ohm in the place of the stage's motor, or the motor back.
+    /// Puts a resistor of so many ohm in the place of the stage's motor, or the motor back.
     pub fn replace_motor(&mut self, ohm: Option<f64>) {
         self.stage.replace_motor(ohm);
     }
 
-    /// Somebody turns the emergency stop back.
+    /// Turns the emergency stop back.
     pub fn release_stop(&mut self) {
         self.faults.e_stop = Stop::default();
         self.supply_motors();
     }
 
-    /// Whether the motors' drivers have their supply.
+    /// Returns true if the motors' drivers have their supply.
     pub fn has_motor_supply(&self) -> bool {
         !self.faults.e_stop.cuts_power() || self.wires.stop_keeps_supply
     }
 
-    /// Somebody holds a limit switch of the stage, or the lever's, actuated with a finger, or lets it go.
+    /// Holds a limit switch of the stage, or the lever's, actuated with a finger, or lets it go.
     pub fn hold_switch(&mut self, switch: Reached, held: bool) {
         match switch {
             Reached::Lower => self.stage.hold_limits(held, false),
@@ -70,7 +70,7 @@ impl World {
     }
 }
 
-/// A switch that somebody can reach.
+/// A switch that a person can reach.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Reached {
     /// The stage's, at its lower end.

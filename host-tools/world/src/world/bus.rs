@@ -7,7 +7,8 @@ use crate::sensor::SensorPeer;
 use crate::slot::Transfer;
 
 impl World {
-    /// One transfer with the finger's first part in mode 0, chip select low from `now_ns` for `duration_ns`; fills `miso`.
+    /// One transfer with the finger's first part in mode 0, chip select low from `now_ns` for `duration_ns`; fills
+    /// `miso`.
     pub fn spi(&mut self, now_ns: u64, duration_ns: u64, mosi: &[u8], miso: &mut [u8]) {
         let transfer = Transfer {
             part: 0,
@@ -38,7 +39,7 @@ impl World {
         }
     }
 
-    /// What the finger's parts have to complain of: writes to reserved bits, and commands that there are not. A BioTac's are
+    /// Complaints of the finger's parts: writes to reserved bits, and unknown commands. A BioTac's are
     /// [`SensorPeer::complaints`].
     pub fn complaints(&self) -> u64 {
         self.peers.complaints()

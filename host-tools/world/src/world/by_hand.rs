@@ -1,4 +1,4 @@
-//! What people do to a rig, and with its finger.
+//! People's operations on a rig, and with its finger.
 
 use super::holder::Holder;
 use super::{NotLifted, World, sample};
@@ -9,14 +9,14 @@ use crate::person::Hand;
 use crate::played::{PlayCounts, Played};
 
 impl World {
-    /// Inclines the stage with a weight on it, so that it is pulled towards lower positions with `pull_n` (paper, Traction:
-    /// weights on the stage at 45 degrees).
+    /// Inclines the stage with a weight on it, so that it is pulled towards lower positions with `pull_n` (paper,
+    /// Traction: weights on the stage at 45 degrees).
     pub fn incline(&mut self, pull_n: f64) {
         self.pull_n = -pull_n;
     }
 
-    /// Somebody turns the lever's screw by its knob, so far up, mm; whether it could be turned, which takes a motor without
-    /// current.
+    /// Turns the lever's screw by its knob, so far up, mm; returns true if it could be turned, which takes a motor
+    /// without current.
     pub fn turn_knob(&mut self, up_mm: f64) -> bool {
         self.lever.turn_by_hand(up_mm, self.finger.force_n())
     }
@@ -26,8 +26,8 @@ impl World {
         self.mount = mount;
     }
 
-    /// Something on the same table shakes the rig from now on, such as a printer: amplitude, g, and frequency, Hz. A BioTac's fluid
-    /// hardly feels it.
+    /// Something on the same table shakes the rig from now on, such as a printer: amplitude, g, and frequency, Hz. A
+    /// BioTac's fluid hardly feels it.
     pub fn shake(&mut self, g: f64, hz: f64) {
         self.table = (g, hz);
         self.finger.hold(Held::STILL);
@@ -78,18 +78,18 @@ impl World {
         Ok(())
     }
 
-    /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an order
-    /// that `seed` gives, over and over. Without any, it feels the sample again.
+    /// Has the finger feel recorded slides instead of the mounted sample: each press-and-slide is the next one of an
+    /// order that `seed` gives, over and over. Without any, it feels the sample again.
     ///
-    /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and shear
-    /// the recorded force once the skin has stretched that far. The sample still carries the press, and makes P_DC; a still
-    /// finger has the simulated sensor's noise. Samples beyond 12 bits are cut, and a recording that is over is that noise:
-    /// see [`World::played`].
+    /// From where the pressed finger begins to move, P_AC is the recorded one about the simulated finger's rest, and
+    /// shear the recorded force once the skin has stretched that far. The sample still carries the press, and makes
+    /// P_DC; a still finger has the simulated sensor's noise. Samples beyond 12 bits are cut, and a recording that is
+    /// over is that noise: see [`World::played`].
     pub fn play(&mut self, slides: Vec<Played>, seed: u64) {
         self.finger.play(slides, seed);
     }
 
-    /// What has been played, and what of it was cut.
+    /// Counts of the slides and samples played, and of the samples that were cut.
     pub fn played(&self) -> PlayCounts {
         self.finger.played()
     }

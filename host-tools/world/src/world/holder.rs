@@ -1,4 +1,4 @@
-//! What holds the finger where lever and stage do not: a hand, or an arm.
+//! The holder of the finger in place of lever and stage: a hand, or an arm.
 
 use crate::arm::Arm;
 use crate::finger::Held;
@@ -25,7 +25,7 @@ impl Holder {
         }
     }
 
-    /// How deep the sample is in the fingertip, mm; negative is a gap.
+    /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub(super) fn indentation_mm(&self) -> f64 {
         match self {
             Self::Hand(hand) => hand.indentation_mm(),

@@ -15,7 +15,7 @@ const TRANSFER_NS: u64 = 3_048;
 const PAC: u8 = 0x80;
 const PDC: u8 = 0x83;
 
-/// Somebody at the pins who looks at the truth.
+/// A bench at the pins that also sees the truth.
 struct Bench {
     world: World,
     now_ns: u64,
@@ -103,7 +103,7 @@ impl Bench {
         (0..100).map(|_| self.counts(PDC)).sum::<f64>() / 100.0
     }
 
-    /// Adds to its hash what all pins say in one slot.
+    /// Adds the levels of all pins in one slot to its hash.
     fn hash_slot(&mut self, command: u8, hash: &mut DefaultHasher) {
         hash.write(&self.sample(command));
         hash.write_i32(self.world.encoder());

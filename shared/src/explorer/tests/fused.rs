@@ -870,21 +870,3 @@ fn a_slide_without_the_features_is_not_used() {
         (None, 0)
     );
 }
-
-/// The last texture of a table has fewer bytes behind its mean than a kernel reads at once.
-#[test]
-fn what_lies_behind_a_mean_does_not_count() {
-    use crate::explorer::kernels::{Candidate, mask};
-    use crate::features::MAX_FEATURES;
-    let mean = [3i16, -400, 5000, -32768];
-    let mut bytes: Vec<u8> = mean.iter().flat_map(|m| m.to_le_bytes()).collect();
-    let last = Candidate::new(&bytes, &mask(mean.len()), None, 0.5, 7);
-    bytes.extend([0xa5; 60]);
-    let first = Candidate::new(&bytes, &mask(mean.len()), None, 0.5, 7);
-    let square: i64 = mean.iter().map(|&m| i64::from(m) * i64::from(m)).sum();
-    for candidate in [last, first] {
-        assert_eq!(candidate.mean[..4], mean);
-        assert_eq!(candidate.mean[4..], [0; MAX_FEATURES - 4]);
-        assert_eq!(i64::from(candidate.square), square);
-    }
-}

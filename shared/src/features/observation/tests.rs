@@ -1,7 +1,7 @@
 //! Features against their definitions.
 
 use super::*;
-use crate::dsp::{Plain, Plan};
+use crate::dsp::Plan;
 use crate::features::{Block, Movement, Slide};
 use crate::table::tests::whitening::Noise;
 use std::vec;
@@ -130,7 +130,7 @@ fn a_slide_says_its_bands_and_pressure() {
     let plan = Plan::new();
     let noise = &mut Noise(5);
     for amplitude in [0.4, 3.0, 40.0, 900.0] {
-        let mut slide = Slide::<Plain>::new(&plan, Movement::FOR_FINENESS);
+        let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
         slide.set_background(2.0);
         let mut last = 0.0;
         let samples: List<i16> = (0..3000)

@@ -1,7 +1,7 @@
 //! A person of made-up words who does what the probe prompts.
 
 use super::*;
-use crate::dsp::{Plain, Plan};
+use crate::dsp::Plan;
 use crate::explorer::{Answer, Verification};
 use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
@@ -39,7 +39,7 @@ struct Obedient {
     prompt: Option<Prompt>,
     /// Ticks since it changed.
     since: u32,
-    /// The contact force that it means by "press", mN.
+    /// Contact force of this person's press, mN.
     presses_mn: f32,
     /// mN of a count of this finger.
     mn_per_count: f32,
@@ -50,9 +50,9 @@ struct Obedient {
     stops: Option<u32>,
     ticks: u32,
     streams: bool,
-    /// Instead of this weight another one is put on, mN.
+    /// Another weight that is put on instead of this one, mN.
     wrong: Option<u16>,
-    /// What 1 g makes, and 0, counts.
+    /// Readings at 1 g and at 0 g, counts.
     g: (f32, f32),
 }
 
@@ -78,7 +78,7 @@ impl Obedient {
         }
     }
 
-    /// Force and vibration of now.
+    /// Force and vibration at this moment.
     fn does(&self) -> (f32, f32) {
         match self.prompt {
             Some(Prompt::Press) => (self.presses_mn, 0.0),
@@ -177,7 +177,7 @@ impl Hand for Obedient {
     }
 }
 
-type Held<'p> = ByHand<'p, Obedient, Plain>;
+type Held<'p> = ByHand<'p, Obedient>;
 
 fn held(plan: &Plan) -> Held<'_> {
     ByHand {
@@ -203,15 +203,15 @@ fn a_person_makes_the_slide_that_is_asked_for_and_its_samples_are_the_hosts() {
     let plan = Plan::new();
     let mut rig = held(&plan);
     rig.hand.streams = true;
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     block_on(rig.perform(&mut slide)).unwrap();
     block_on(rig.lifted()).unwrap();
     let measured = slide.finish().unwrap();
     let expected = [Prompt::Lift, Prompt::Press, Prompt::Slide, Prompt::Lift];
     assert_eq!(prompts(&rig), expected);
     assert_eq!(rig.hand.shown, ["Press", "Slide", "Lift"]);
-    // the same slide, from what was streamed
-    let mut streamed = Slide::<Plain>::new(&plan, MOVEMENT);
+    // the same slide, from the streamed samples
+    let mut streamed = Slide::new(&plan, MOVEMENT);
     let (mut pdc, mut steady) = (List::new(), 0..0);
     for event in &rig.hand.told {
         match event {
@@ -247,7 +247,7 @@ fn a_slide_that_is_no_good_is_asked_for_again_with_the_reason() {
     let mut rig = held(&plan);
     rig.hand.presses_mn = 1600.0;
     rig.hand.stops = Some(600);
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     assert_eq!(block_on(rig.perform(&mut slide)), Err(RigError::Stopped));
     assert!(prompts(&rig).contains(&Prompt::Again(Again::TooHard)));
     // nothing is wanted any more
@@ -258,7 +258,7 @@ fn a_slide_that_is_no_good_is_asked_for_again_with_the_reason() {
 fn nobody_there_a_person_who_gives_up_and_another_movement_end_it() {
     let plan = Plan::new();
     let ends = |mut rig: Held<'_>, movement| {
-        let mut slide = Slide::<Plain>::new(&plan, movement);
+        let mut slide = Slide::new(&plan, movement);
         let done = block_on(rig.perform(&mut slide));
         assert_eq!(rig.handheld.prompt(), None);
         (done.unwrap_err(), rig.hand.ticks)
@@ -283,7 +283,7 @@ fn the_host_is_reminded_every_second_that_a_person_is_waited_for() {
     let mut rig = held(&plan);
     rig.hand.presses_mn = 0.0;
     rig.hand.stops = Some(10 * TICKS_HZ);
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     let _ = block_on(rig.perform(&mut slide));
     let told = rig.hand.told.iter();
     let prompts = told.filter(|event| matches!(event, Event::Prompt(_)));
@@ -309,11 +309,11 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
     kept.pressure.force_mn_per_count = ForceScale::of(&points).unwrap().mn_per_count;
     block_on(rig.set_calibration(kept)).unwrap();
     // 0.5 N of this finger is 0.5 N now, and can be slid with
-    let mut slide = Slide::<Plain>::new(&plan, MOVEMENT);
+    let mut slide = Slide::new(&plan, MOVEMENT);
     block_on(rig.perform(&mut slide)).unwrap();
     let force_mn = rig.state().force_mn;
     assert!((force_mn - 500.0).abs() < 15.0, "{force_mn}");
-    // what is no weight at all is waited for in vain
+    // no weight at all: the wait ends without result
     rig.hand.prompt = None;
     rig.hand.stops = Some(rig.hand.ticks + 200);
     rig.hand.mn_per_count = 1e6;
@@ -348,7 +348,7 @@ fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
     let mg = set.pressure.pac_pa_per_count;
     assert!((mg * 0.994 - 1.0).abs() < 1e-3, "{mg}");
     assert_eq!(set.turned, RigCalibration::UNDATED);
-    // the force is what it was
+    // the force is the same as before
     assert_eq!(set.scale_day(), None);
     assert_eq!(prompts(&rig), [Prompt::Still, Prompt::TurnOver]);
     let about = About::default();
@@ -369,7 +369,7 @@ fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
         store = block_on(Store::open(flash)).unwrap();
         assert_eq!(block_on(store.calibration()), Ok(Some(set)));
     }
-    // it lies on its side until nobody waits any more
+    // it lies on its side until the wait is over
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     rig.hand.g = (0.0, 0.0);
     block_on(rig.set_gravity(&mut memory));
@@ -384,7 +384,7 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     let mut rig = held(&plan);
     rig.serves = false;
-    // somebody stopped a host's request before
+    // a host's request was stopped before
     rig.hand.stops = Some(0);
     rig.hand.mn_per_count = 14.0;
     block_on(rig.set_force(&mut memory));
@@ -437,7 +437,7 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
     let flash = memory.close().0.unwrap().close().again();
     let mut store = block_on(Store::open(flash)).unwrap();
     assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-    // who gives up is back where they were
+    // a person who gives up is back at the start
     let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     rig.hand.gives_up = Some(rig.hand.ticks + 400);
     block_on(rig.set_force(&mut memory));
@@ -467,6 +467,7 @@ fn what_the_host_found_out_is_shown() {
             background: 1.0,
             bands: Vec::new(),
             pressure: None,
+            pace: None,
         },
         posterior: Vec::from_slice(&posterior).unwrap(),
     });
@@ -486,7 +487,7 @@ fn what_the_host_found_out_is_shown() {
     assert_eq!(leading, [(1, 0.6), (3, 0.25), (0, 0.1)]);
     assert!(!judgement.sure && !judgement.open);
     assert!(shown.judgement().is_none());
-    // whether it is one texture
+    // the question about one texture
     for (answer, sure, unknown) in [
         (Answer::Same, true, false),
         (Answer::Different, false, true),

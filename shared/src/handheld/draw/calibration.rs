@@ -12,7 +12,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     pub(super) fn weigh(&mut self, mn: u16, force_mn: f32) -> Done<D> {
         self.title("Calibrate", "keep still")?;
         self.centre("Put on", 13, &LARGE)?;
-        // what is written on weights
+        // the figure written on weights
         let grams = (u32::from(mn) * 1000 + 4903) / 9807;
         self.centre(&say(format_args!("{grams} g")), 32, &LARGE)?;
         let reads = force_mn as u16;

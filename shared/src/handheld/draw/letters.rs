@@ -1,4 +1,4 @@
-//! Letters, point by point. embedded-graphics has the fonts; what it writes them with can do much more, and takes 3 KB.
+//! Letters, point by point. embedded-graphics has the fonts; its text renderer can do much more, and takes 3 KB.
 
 use embedded_graphics::Pixel;
 use embedded_graphics::draw_target::DrawTarget;
@@ -31,7 +31,7 @@ pub(super) static SMALL: Font = Font::of(&ascii::FONT_6X10);
 pub(super) static BOLD: Font = Font::of(&ascii::FONT_7X13_BOLD);
 pub(super) static LARGE: Font = Font::of(&ascii::FONT_10X20);
 
-/// Which point of a text is at the given one.
+/// The point of a text that is at the given place.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Left,

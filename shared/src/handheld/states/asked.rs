@@ -1,8 +1,7 @@
-//! What the host wants of the person who holds the probe: a slide, the finger in the air, or a weight on it. The pages are
-//! those of the person's own use; what was measured is the host's.
+//! Requests of the host to the person who holds the probe: a slide, the finger in the air, or a weight on it. The pages
+//! are those of the person's own use; the measurement belongs to the host.
 
 use super::{Answer, Asked, Handheld, Page};
-use crate::explorer::Kernels;
 use crate::features::Slide;
 use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
@@ -14,7 +13,7 @@ use crate::rig::{self, Fault};
 use crate::table::Name;
 use crate::wire::Prompt;
 
-impl<'p, K: Kernels> Handheld<'p, K> {
+impl<'p> Handheld<'p> {
     fn ask(&mut self, asked: Asked, page: Page) {
         self.clear_episode();
         self.job = None;
@@ -24,7 +23,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.show(page);
     }
 
-    /// Asks the person for a slide, which [`Handheld::answer`] tells of.
+    /// Asks the person for a slide; [`Handheld::answer`] gives the result.
     pub fn ask_for_slide(&mut self, asked: Asked) {
         self.ask(asked, Page::Touching);
     }
@@ -53,12 +52,12 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    /// What came of the last request, once.
+    /// Takes the result of the last request; `None` the second time.
     pub fn answer(&mut self) -> Option<Answer> {
         self.answer.take()
     }
 
-    /// The host wants nothing any more; the page for its slides is left.
+    /// Ends the host's request and leaves the page for its slides.
     pub fn release(&mut self) {
         let wanted = self.asked.take().is_some();
         self.answer = None;
@@ -73,8 +72,8 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.begin();
     }
 
-    /// The host's slides said this: shown as after the person's own, and it can be taught. `compared`: the question was whether
-    /// it is the first one.
+    /// Takes the verdict of the host's slides: shown as after the person's own, and it can be taught. `compared`: the
+    /// question was whether it is the first one.
     pub fn told(&mut self, judgement: Judgement, compared: bool) {
         self.clear_episode();
         let first = judgement.leading.first().filter(|_| compared);
@@ -82,13 +81,13 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.show_verdict(judgement);
     }
 
-    /// The host's slides taught this texture.
+    /// The host's slides trained this texture.
     pub fn trained(&mut self, name: Name) {
         self.sound(super::SURE_IT_IS);
         self.show(Page::Learned(Ok(name)));
     }
 
-    /// Another table is in force, of so many textures: what is shown of the old one is over.
+    /// Another table is in force, with so many textures: leaves the pages of the old one.
     pub fn table_changed(&mut self, textures: u16) {
         self.textures = textures;
         if matches!(
@@ -104,13 +103,14 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    /// What came of [`Job::Calibrate`](super::Job::Calibrate): the force per count, or why it is as it was, if there is more to say.
+    /// Takes the result of [`Job::Calibrate`](super::Job::Calibrate): the force per count, or the reason why it has not
+    /// changed, if there is one to show.
     pub fn calibrated(&mut self, done: Result<ForceScale, Option<&'static str>>) {
         self.release();
         self.came_of(done, Page::Calibrated);
     }
 
-    /// What came of [`Job::TurnOver`](super::Job::TurnOver), in the same way.
+    /// Takes the result of [`Job::TurnOver`](super::Job::TurnOver), in the same way.
     pub fn turned(&mut self, done: Result<Turned, Option<&'static str>>) {
         self.release();
         self.came_of(done, Page::Turned);
@@ -130,12 +130,12 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.show(page(done));
     }
 
-    /// From now on a count of P_DC means so many mN.
+    /// Sets the contact force of a count of P_DC, mN.
     pub fn calibrate(&mut self, mn_per_count: f32) {
         self.touch.calibrate(mn_per_count);
     }
 
-    /// What the person is to do for the host now; `None`: nothing.
+    /// The person's task for the host now; `None`: nothing.
     pub fn prompt(&self) -> Option<Prompt> {
         self.asked?;
         Some(match (&self.page, self.touch.view().phase) {
@@ -150,7 +150,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
     }
 
     /// The slide that was good last, until the finger is pressed again.
-    pub fn slide(&self) -> &Slide<'p, K> {
+    pub fn slide(&self) -> &Slide<'p> {
         self.touch.slide()
     }
 
@@ -174,7 +174,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         self.touch.view()
     }
 
-    /// What keeps the probe from sliding.
+    /// The fault that keeps the probe from sliding.
     pub fn fault(&self) -> Option<Fault> {
         match &self.page {
             Page::Fault(Trouble::Silent) => Some(Fault::SensorSilent),
@@ -183,7 +183,7 @@ impl<'p, K: Kernels> Handheld<'p, K> {
         }
     }
 
-    /// What a rig would be doing.
+    /// The phase of a rig in this state.
     pub fn phase(&self) -> rig::Phase {
         if let Some(fault) = self.fault() {
             return rig::Phase::Faulted(fault);

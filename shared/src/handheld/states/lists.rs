@@ -1,4 +1,4 @@
-//! The lists that one button goes through: what to do, which texture to compare with, what a texture can be called.
+//! The lists that one button goes through: the menu, the texture to compare with, the name of a texture.
 
 use heapless::Vec;
 
@@ -17,14 +17,14 @@ pub enum Choice {
     Spelled(Name),
 }
 
-/// What is chosen from a list.
+/// The lists.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum List {
-    /// What to do.
+    /// The menu.
     Menu,
     /// The texture that the next slides are compared with.
     Reference,
-    /// What the texture is called that was touched.
+    /// The name of the touched texture.
     Name,
 }
 
@@ -38,7 +38,7 @@ impl List {
     }
 }
 
-/// What can be chosen.
+/// The entries of the lists.
 pub(super) enum Entry {
     Compare,
     About,
@@ -50,7 +50,7 @@ pub(super) enum Entry {
     Nothing,
 }
 
-/// A list, by a table of so many textures and what was judged last.
+/// A list, with the number of textures in the table and the last judgement.
 #[derive(Clone, Copy)]
 pub(super) struct Entries<'j> {
     pub(super) list: List,
@@ -60,8 +60,8 @@ pub(super) struct Entries<'j> {
 }
 
 impl<'j> Entries<'j> {
-    /// How many there are. Names: the leading textures, a new one with a number, a new one that is spelled, nothing, and all
-    /// other textures.
+    /// Number of entries. Names: the leading textures, a new one with a number, a new one that is spelled, nothing, and
+    /// all other textures.
     pub(super) fn count(self) -> u16 {
         match self.list {
             List::Menu if self.turns => 5,
@@ -77,7 +77,7 @@ impl<'j> Entries<'j> {
         leading.map(|(texture, _)| *texture)
     }
 
-    /// What an entry stands for.
+    /// The meaning of an entry.
     pub(super) fn entry(self, at: u16) -> Entry {
         match (self.list, at) {
             (List::Menu, 0) => return Entry::Compare,

@@ -1,15 +1,14 @@
-//! What time and the button do on each page: a short press goes on, a long one takes.
+//! Effects of time and of the button on each page: a short press moves on, a long one takes.
 
 use super::lists::{Entry, List};
 use super::{Answer, CLICK, Choice, DARK_AFTER, Handheld, Job, LEARNED, NO_WORDS, Page};
-use crate::explorer::Kernels;
 use crate::handheld::button::Press;
 use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::spelling::{Spelling, Taken};
 
-impl<K: Kernels> Handheld<'_, K> {
-    /// A hundredth of a second, and whether the button is pressed.
+impl Handheld<'_> {
+    /// A hundredth of a second, with the level of the button.
     pub fn tick(&mut self, pressed: bool) {
         self.shown = self.shown.saturating_add(1);
         self.idle = self.idle.saturating_add(1);
@@ -37,7 +36,7 @@ impl<K: Kernels> Handheld<'_, K> {
         self.fresh = true;
         let asks = self.judgement.as_ref().is_some_and(Judgement::is_changed);
         match (&mut self.page, press) {
-            // nothing to be said while the table is at work
+            // no sound while the table is at work
             (Page::Thinking | Page::Saving, _) => return,
             (Page::Dark, _) => self.begin(),
             (Page::Ready, Press::Short) => self.show(Page::Choose(List::Menu, 0)),
@@ -80,7 +79,7 @@ impl<K: Kernels> Handheld<'_, K> {
         self.sound(CLICK);
     }
 
-    /// Does what an entry stands for.
+    /// Carries out an entry.
     fn take(&mut self, list: List, at: u16) {
         match self.entries(list).entry(at) {
             Entry::Compare => self.show(Page::Choose(List::Reference, 0)),

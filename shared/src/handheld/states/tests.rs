@@ -1,7 +1,6 @@
-//! The probe's states, whatever happens to them; with made-up slides, since touches have tests of their own.
+//! Tests of the probe's states under any events; with made-up slides, since touches have tests of their own.
 
 use super::*;
-use crate::dsp::Plain;
 use crate::explorer::EpisodeSummary;
 use crate::handheld::draw;
 use crate::handheld::judge::{FEATURES, free_name, judge};
@@ -57,7 +56,7 @@ fn with_limits() -> List<u8> {
     table.as_bytes().to_vec()
 }
 
-/// A slide that feels like one of them; `None`: like none, as far from each as they are from each other.
+/// A slide that feels like one of them, or, for `None`, like none: as far from each as they are from each other.
 fn slide(texture: Option<usize>) -> Observation {
     let mut features = [0; 14];
     match texture {
@@ -71,13 +70,13 @@ fn slide(texture: Option<usize>) -> Observation {
     }
 }
 
-/// A probe, its table, and what was learned.
+/// A probe, its table, and the name that was learned.
 struct Bench<'p> {
-    probe: Handheld<'p, Plain>,
+    probe: Handheld<'p>,
     table: List<u8>,
     learned: List<(Choice, u8)>,
     episode: Option<EpisodeSummary>,
-    /// Whatever is known has changed.
+    /// Every texture in the table counts as changed.
     changed: bool,
 }
 
@@ -98,7 +97,7 @@ impl<'p> Bench<'p> {
         reference: Option<u16>,
     ) -> Result<(Judgement, EpisodeSummary), JudgeError> {
         let table = Table::read(&self.table).unwrap();
-        judge::<Plain>(table, slides, reference, None)
+        judge(table, slides, reference, None)
     }
 
     fn work(&mut self) {
@@ -153,7 +152,7 @@ impl<'p> Bench<'p> {
         self.probe.judgement.as_ref().unwrap()
     }
 
-    /// The first words of what is shown.
+    /// The first words of the screen.
     fn shown(&self) -> std::string::String {
         let table = Table::read(&self.table).unwrap();
         let screen = self.probe.screen(Some(&table), &About::default());
@@ -230,7 +229,7 @@ fn a_changed_one_is_moved_by_yes_and_named_anew_after_no() {
     assert_eq!(bench.shown(), "Changed");
     assert_eq!(bench.verdict().leading[0].0, 3);
     assert_eq!(bench.learned, []);
-    // what is none of them is not asked about
+    // an unknown one is not asked about
     (0..2).for_each(|_| bench.slide(None));
     assert_eq!(bench.shown(), "Unknown");
 }
@@ -330,7 +329,7 @@ fn a_texture_is_compared_with_one_that_was_chosen() {
         (bench.shown().as_str(), bench.probe.go()),
         ("Press", Some(false))
     );
-    // a touch that comes to nothing ends nothing
+    // a touch without result ends nothing
     for event in [Event::Down, Event::Up] {
         bench.probe.on_touch(event);
     }
@@ -377,7 +376,7 @@ fn who_is_not_sure_is_asked_to_slide_again_and_five_slides_are_the_end() {
     let mut bench = Bench::new(&plan);
     bench.table = with_limits();
     choose_reference(&mut bench, 0);
-    // whatever the slides are like
+    // for any slides
     let unsure = |open| Judgement {
         leading: [(0, 1.0)].into_iter().collect(),
         open,
@@ -402,12 +401,13 @@ fn who_is_not_sure_is_asked_to_slide_again_and_five_slides_are_the_end() {
             ("Compared", true)
         );
     }
-    // what comes next is another sample
+    // the next one is another sample
     bench.probe.on_touch(Event::Down);
     assert!(bench.probe.episode.is_empty());
 }
 
-/// After five slides the leading one is shown, and more slides of the same episode may follow, up to ten; or the button ends it.
+/// After five slides the leading one is shown, and more slides of the same episode may follow, up to ten; or the button
+/// ends it.
 #[test]
 fn who_is_not_sure_after_five_slides_may_go_on_to_ten_or_end_it() {
     let plan = Plan::new();
@@ -455,7 +455,7 @@ fn who_is_not_sure_after_five_slides_may_go_on_to_ten_or_end_it() {
             bench.press(10);
             assert_eq!(bench.probe.page, Page::Ready);
         }
-        // what comes next is another sample
+        // the next one is another sample
         bench.probe.on_touch(Event::Down);
         assert!(bench.probe.episode.is_empty());
     }
@@ -524,7 +524,7 @@ fn melodies_end() {
     assert_eq!(bench.probe.tone(), None);
 }
 
-/// What may happen to a probe.
+/// Events of a probe.
 #[derive(Clone, Debug)]
 enum Happens {
     Touched(u8),
@@ -556,7 +556,7 @@ proptest! {
     #[test]
     fn whatever_happens_only_good_slides_count(steps in proptest::collection::vec(happens(), 1..80)) {
         let plan = Plan::new();
-        let mut probe = Handheld::<Plain>::new(&plan, 4);
+        let mut probe = Handheld::new(&plan, 4);
         let bytes = table();
         let table = Table::read(&bytes).unwrap();
         let mut good: List<Observation> = List::new();

@@ -1,7 +1,6 @@
 //! Touches of made-up signals: a finger on a spring, vibrations of noise.
 
 use super::*;
-use crate::dsp::Plain;
 use crate::probe::explore::Random;
 use crate::sensor::pressure::Counts;
 use proptest::prelude::*;
@@ -65,7 +64,7 @@ fn words(parts: &[Part]) -> List<Option<Pressure>> {
 
 fn feel(words: &[Option<Pressure>]) -> List<Event> {
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     words.iter().filter_map(|word| touch.word(*word)).collect()
 }
 
@@ -146,7 +145,7 @@ fn slides_that_are_no_good_say_why() {
         assert_eq!(again(&events), Some(why), "{events:?}");
         assert!(!events.iter().any(|e| matches!(e, Event::Slid(_))), "{why}");
     }
-    // before the slide it is only asked to be lighter, but for what nobody means
+    // before the slide it only asks for a lighter press, but for a force that no person intends
     for (mn, why) in [(1100.0, None), (1700.0, Some(Again::TooHard))] {
         let events = feel(&words(&with(pressed(500.0), std::vec![part(0.3, mn, 0.0)])));
         assert_eq!(again(&events), why, "{mn}");
@@ -167,7 +166,7 @@ fn a_lost_word_spoils_a_slide_and_only_delays_a_press() {
     assert!(matches!(events.last(), Some(Event::Slid(_))), "{events:?}");
     // words that were lost on the way count as much
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     let mut spoiled = None;
     for (n, word) in words(&slide).into_iter().enumerate() {
         if n == 8800 {
@@ -243,9 +242,14 @@ fn a_sensor_that_is_silent_or_hangs_is_noticed() {
 }
 
 proptest! {
-    /// Whatever the words are, nothing panics, and a slide that was rejected gives no observation.
+    /// For any words, nothing panics, and a rejected slide gives no observation.
     #[test]
-    fn any_words_will_do(parts in proptest::collection::vec((0.0..0.6f64, -200.0..3000f64, -200.0..3000f64, 0.0..900f64, 0.0..0.01f64), 1..12)) {
+    fn any_words_will_do(
+        parts in proptest::collection::vec(
+            (0.0..0.6f64, -200.0..3000f64, -200.0..3000f64, 0.0..900f64, 0.0..0.01f64),
+            1..12,
+        ),
+    ) {
         let mut all = words(&[part(0.3, 0.0, 0.0)]);
         for (seconds, from, to, rms, lost) in parts {
             let mut some = words(&[Part { seconds, mn: (from, to), rms: (rms, rms) }]);
@@ -266,10 +270,10 @@ proptest! {
     }
 }
 
-/// What happens to a probe whose sensor of motion says so every 10 ms, from where the parts begin: for so long, counts.
+/// Events of a probe whose sensor of motion reports every 10 ms, from the beginning of the parts: for so long, counts.
 fn feel_moving(parts: &[Part], seen: &[(f64, Moved)]) -> List<Event> {
     let plan = Plan::new();
-    let mut touch = Touch::<Plain>::new(&plan);
+    let mut touch = Touch::new(&plan);
     let each = seen.iter();
     let mut readings = each.flat_map(|(s, moved)| std::vec![*moved; (s * 100.0) as usize]);
     let mut events = List::new();
@@ -361,6 +365,6 @@ fn a_slide_that_is_not_seen_all_the_way_has_no_speed() {
         });
         assert_eq!(observed.unwrap().pace, None, "{seen:?}");
     }
-    // without any it is as without a sensor
+    // without any it behaves as without a sensor
     assert_eq!(feel_moving(&parts, &[(4.0, None)]), feel(&words(&parts)));
 }

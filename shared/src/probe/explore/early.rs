@@ -1,6 +1,6 @@
 //! A slide that may end before its end: see [`crate::explorer::Look`].
 
-use crate::explorer::{Explorer, Kernels, ObserveError, most_doubt};
+use crate::explorer::{Explorer, ObserveError, most_doubt};
 use crate::features::{Measurement, Observation, Slide, SlideError};
 use crate::rig::Rig;
 use crate::sensor::pressure::samples_in;
@@ -16,11 +16,11 @@ pub(super) struct Length {
 }
 
 /// Makes a slide; the length at which it ended, if the verdict was certain before its end.
-pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
+pub(super) async fn perform<R: Rig, const N: usize>(
     rig: &mut R,
-    explorer: &mut Explorer<'_, N, K>,
+    explorer: &mut Explorer<'_, N>,
     action: Action,
-    slide: &mut Slide<'_, K>,
+    slide: &mut Slide<'_>,
 ) -> Result<Option<Length>, R::Error> {
     let Some(most) = most_doubt(explorer.config().method) else {
         return rig.perform(slide).await.map(|()| None);
@@ -28,7 +28,7 @@ pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
     let mut lengths = (1..).zip(explorer.table().lengths_ms());
     let mut next = lengths.next();
     let mut ended = None;
-    let enough = &mut |slide: &mut Slide<'_, K>| {
+    let enough = &mut |slide: &mut Slide<'_>| {
         let Some((n, ms)) = next.filter(|(_, ms)| slide.samples() >= samples_in(*ms)) else {
             return false;
         };
@@ -48,8 +48,8 @@ pub(super) async fn perform<R: Rig, const N: usize, K: Kernels>(
 }
 
 /// What a slide says that ended at this length, or at its end.
-pub(super) fn measure<K: Kernels>(
-    mut slide: Slide<'_, K>,
+pub(super) fn measure(
+    mut slide: Slide<'_>,
     length: Option<Length>,
 ) -> Result<Measurement, SlideError> {
     match length {
@@ -59,8 +59,8 @@ pub(super) fn measure<K: Kernels>(
 }
 
 /// Takes in a slide that ended at this length, or at its end.
-pub(super) fn observe<const N: usize, K: Kernels>(
-    explorer: &mut Explorer<'_, N, K>,
+pub(super) fn observe<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
     action: Action,
     length: Option<Length>,
     slide: &Measurement,

@@ -1,5 +1,4 @@
 use super::*;
-use crate::dsp::Kernels;
 use crate::explorer::ObserveError;
 use crate::explorer::{Config, Explorer, Strategy};
 use crate::features::SlideError;
@@ -42,7 +41,7 @@ impl Rig for Script {
         [Property::Traction].into_iter().collect()
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error> {
         let stimuli = self
             .stimuli
             .get(self.made.len())
@@ -164,7 +163,7 @@ impl Rig for Slow<'_> {
         self.0.measures()
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error> {
         self.1.borrow_mut().push("performed");
         self.0.perform(slide).await
     }

@@ -1,7 +1,6 @@
 //! A probe with a scripted rig and a store in RAM is asked everything.
 
 use super::*;
-use crate::dsp::Plain;
 use crate::probe::seams::{Events, Panel, RigHandle, StoredBytes, UnloadedRun};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
@@ -46,7 +45,7 @@ impl Rig for Bench {
         PropertySet::ALL
     }
 
-    async fn perform<K: Kernels>(&mut self, slide: &mut Slide<'_, K>) -> Result<(), Self::Error> {
+    async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error> {
         self.state.skin = SkinCare::after(self.state.skin.energy_j() + 1.0, 0.5);
         self.script.perform(slide).await
     }
@@ -251,7 +250,7 @@ fn a_table_whose_bytes_have_changed_is_reported_whatever_is_in_its_place() {
 }
 
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
-    let done = block_on(probe.perform::<Plain>(&command));
+    let done = block_on(probe.perform(&command));
     done.map_err(|why| why.to_string())
 }
 
@@ -399,8 +398,7 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
             table_bytes: 200,
             table_crc: 77,
             factory: false,
-            // the paper's scale, whatever its date
-            calibrated: 0,
+            calibrated: 20_261_121,
             counts: desk.counts(),
             skin_mj: (1500, 250),
             false_alarm: Some(0.1),
@@ -448,9 +446,9 @@ fn what_comes_while_the_probe_is_busy_is_answered_or_refused() {
 fn a_request_is_answered_by_its_number_when_it_is_over() {
     let mut probe = probe();
     let request = |id, command| Request { id, command };
-    block_on(probe.serve::<Plain>(&request(3, Command::Home)));
+    block_on(probe.serve(&request(3, Command::Home)));
     probe.rig.refuses = true;
-    block_on(probe.serve::<Plain>(&request(4, Command::Home)));
+    block_on(probe.serve(&request(4, Command::Home)));
     let jams = Event::Refused {
         id: 4,
         why: Failure::Rig(JAMS),
@@ -491,7 +489,7 @@ fn an_exploration_is_kept_until_the_rig_moves_again() {
     feels(&mut probe, &[]);
     assert_eq!(
         command(&mut probe, exploration(false)).unwrap_err(),
-        "the rig does not come to an end: home it"
+        "the movement does not end: home the rig"
     );
     assert!(command(&mut probe, Command::Label(name("oak"))).is_err());
 }
@@ -556,8 +554,8 @@ fn a_calibration_is_measured_reported_used_and_kept() {
     assert_eq!(kept(&mut probe), Some(used));
     let write = |bytes: &[u8]| Command::WriteCalibration(Vec::from_slice(bytes).unwrap());
     let short = command(&mut probe, write(&[0; 59])).unwrap_err();
-    assert_eq!(short, "a calibration has 60 or 64 bytes");
-    assert!(command(&mut probe, write(&[0xFF; 60])).is_err());
+    assert_eq!(short, "a calibration has 64 bytes");
+    assert!(command(&mut probe, write(&[0xFF; 64])).is_err());
     assert_eq!(
         (kept(&mut probe), probe.rig.state.calibration),
         (Some(used), used)

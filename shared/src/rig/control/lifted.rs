@@ -1,4 +1,4 @@
-//! What is done with a lifted finger: runs without load, and weights that a person lays on it.
+//! Operations on a lifted finger: runs without load, and weights that a person lays on it.
 
 use super::Control;
 use crate::features::Movement;
@@ -6,8 +6,8 @@ use crate::rig::phase::{Phase, Refused};
 use crate::rig::slide::Run;
 
 impl Control {
-    /// Moves the stage over the whole sample at `speed_um_s` um/s with the finger lifted, and measures the motor current at
-    /// constant speed: see [`Control::mean_current_a`].
+    /// Moves the stage over the whole sample at `speed_um_s` um/s with the finger lifted, and measures the motor
+    /// current at constant speed: see [`Control::mean_current_a`].
     ///
     /// # Errors
     /// See [`Refused`].
@@ -45,9 +45,9 @@ impl Control {
         self.air
     }
 
-    /// A person is asked to lay a weight of so many mN on the lifted finger; 0, and none is expected any more. Until then, or until
-    /// something else begins, P_DC may rise by that much more than otherwise while the finger waits. The guard's limit of force and
-    /// the lever's switch, to which the lever goes first, protect the finger as ever.
+    /// Expects a person to lay a weight of so many mN on the lifted finger; 0 ends that. Until then, or until something
+    /// else begins, P_DC may rise by that much more than otherwise while the finger waits. The guard's limit of force
+    /// and the lever's switch, to which the lever goes first, protect the finger as ever.
     ///
     /// # Errors
     /// See [`Refused`].

@@ -22,7 +22,7 @@ fn a_lever_that_cannot_press_is_a_fault_and_lifts() {
     );
     assert_eq!(control.lever.state(), LeverState::Unknown);
     control.enter(Phase::Positioning);
-    // where the stage stands is known, where the lever is is not
+    // the stage's place is known, the lever's is not
     control.stage.home();
     for ms in 0..100 {
         let inputs = Inputs {

@@ -11,8 +11,8 @@ fn word(channel: Channel, counts: u16) -> Option<Pressure> {
     })
 }
 
-/// What a rig at rest shows; P_AC has its noise.
-fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
+/// The inputs of a rig at rest; P_AC has its noise.
+fn at_rest(ms: u32) -> ([Option<Pressure>; 4], GuardInputs<'static>) {
     let pac = |n: u32| word(Channel::Pac, 2040 + (ms * 7 + n * 5) as u16 % 9);
     let words = [
         pac(0),
@@ -20,7 +20,7 @@ fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
         pac(1),
         word(Channel::Pdc, 2593),
     ];
-    let seen = Seen {
+    let inputs = GuardInputs {
         words: &[],
         e_stop: false,
         hung: false,
@@ -31,22 +31,24 @@ fn at_rest(ms: u32) -> ([Option<Pressure>; 4], Seen<'static>) {
         stage_mm: 30.0,
         emf_mm_s: 0.0,
     };
-    (words, seen)
+    (words, inputs)
 }
 
-/// Runs a second of ms, each changed by `change`; returns the first fault and when.
-fn run(change: impl Fn(u32, &mut [Option<Pressure>; 4], &mut Seen<'_>)) -> Option<(u32, Fault)> {
+/// Runs a second of ms, each changed by `change`; returns the first fault and its time.
+fn run(
+    change: impl Fn(u32, &mut [Option<Pressure>; 4], &mut GuardInputs<'_>),
+) -> Option<(u32, Fault)> {
     let mut guard = Guard::default();
     let meter = ForceMeter::new(2593.0);
     (0..1000).find_map(|ms| {
-        let (mut words, mut seen) = at_rest(ms);
-        change(ms, &mut words, &mut seen);
+        let (mut words, mut inputs) = at_rest(ms);
+        change(ms, &mut words, &mut inputs);
         Some((
             ms,
             guard.tick(
-                &Seen {
+                &GuardInputs {
                     words: &words,
-                    ..seen
+                    ..inputs
                 },
                 &meter,
                 &BioTac::MODEL,
@@ -129,7 +131,7 @@ fn half_a_percent_of_damaged_words_is_too_many() {
 
 #[test]
 fn a_standing_stage_is_blocked_or_its_encoder_silent() {
-    let moving = |ms: u32, s: &mut Seen<'_>| {
+    let moving = |ms: u32, s: &mut GuardInputs<'_>| {
         s.stage_wanted_mm_s = 10.0;
         s.emf_mm_s = 10.0;
         s.stage_mm = 30.0 + ms.min(500) as f32 * 0.01;
@@ -163,12 +165,12 @@ fn no_calibration_allows_more_than_the_papers() {
         // 2.05 N are 178.3 counts of 11.5 mN
         meter.push(Counts::new(2179).unwrap());
     }
-    let (words, seen) = at_rest(0);
+    let (words, inputs) = at_rest(0);
     for mn_per_count in [1.0, 11.5, 12.0] {
         let fault = Guard::default().tick(
-            &Seen {
+            &GuardInputs {
                 words: &words,
-                ..seen
+                ..inputs
             },
             &meter,
             &BioTac::MODEL,
@@ -188,11 +190,11 @@ fn no_calibration_allows_more_than_the_papers() {
     let trips = |counts: u16, mn_per_count: f32| {
         let mut meter = ForceMeter::new(2000.0);
         (0..44).for_each(|_| meter.push(Counts::new(2000 + counts).unwrap()));
-        let seen = Seen {
+        let inputs = GuardInputs {
             words: &words,
-            ..seen
+            ..inputs
         };
-        let fault = Guard::default().tick(&seen, &meter, &half, mn_per_count, 2050.0);
+        let fault = Guard::default().tick(&inputs, &meter, &half, mn_per_count, 2050.0);
         fault == Some(Fault::ForceHigh)
     };
     assert!(!trips(356, 5.75) && trips(357, 5.75));
@@ -200,9 +202,9 @@ fn no_calibration_allows_more_than_the_papers() {
     meter.zero();
     assert_eq!(
         Guard::default().tick(
-            &Seen {
+            &GuardInputs {
                 words: &words,
-                ..seen
+                ..inputs
             },
             &ForceMeter::new(2000.0),
             &BioTac::MODEL,
@@ -224,23 +226,23 @@ fn the_table_has_every_fault_once_and_a_fault_can_be_ignored() {
     }
     assert_eq!(Fault::ArmOff as usize + 1, FAULTS.len());
     let mut guard = Guard::new(Unguarded::against(Fault::EStop));
-    let (words, seen) = at_rest(0);
-    let seen = Seen {
+    let (words, inputs) = at_rest(0);
+    let inputs = GuardInputs {
         words: &words,
         e_stop: true,
         lever_top: true,
-        ..seen
+        ..inputs
     };
     let meter = ForceMeter::new(2593.0);
     assert_eq!(
-        guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0),
+        guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0),
         None
     );
     guard.reset();
-    guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0);
-    guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0);
+    guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0);
+    guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0);
     assert_eq!(
-        guard.tick(&seen, &meter, &BioTac::MODEL, 11.5, 2050.0),
+        guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0),
         Some(Fault::LeverLimit),
         "the others are still looked for"
     );

@@ -15,7 +15,7 @@ struct Bench {
     /// The sample's surface below the homed finger, mm, and how much it gives way, mm/N.
     clear_mm: f32,
     compliance: f32,
-    /// The skin is torn: the finger feels nothing.
+    /// The skin is torn: neither signal shows a contact.
     torn: bool,
     /// P_DC of the finger and the height over the sample at which it still came down fast, and the ms of it all.
     fast: (f32, f32),
@@ -51,7 +51,7 @@ impl Bench {
         low * libm::sqrtf(low) / 0.0115
     }
 
-    /// Lets the lever go on until it is in this state.
+    /// Runs the lever until it is in this state.
     fn until(&mut self, wanted: LeverState) -> Result<(), Fault> {
         for _ in 0..60_000 {
             let counts = if self.torn { 0.0 } else { self.counts() };
@@ -79,7 +79,7 @@ impl Bench {
         panic!("no end in a minute");
     }
 
-    /// Presses to 0.5 N: how that ended, and the force at its end in counts.
+    /// Presses to 0.5 N; returns its result, and the force at its end in counts.
     fn press(&mut self) -> (Result<(), Fault>, f32) {
         let ended = self.until(LeverState::Lifted).and_then(|()| {
             assert!(self.lever.press(43.5));
@@ -130,7 +130,7 @@ fn a_finger_that_feels_nothing_where_it_felt_the_sample_stops() {
     }
 }
 
-/// A finger that waits over the sample goes to the switch, and what was known of the sample still counts there.
+/// A finger that waits over the sample goes to the switch, and the place of the sample stays known there.
 #[test]
 fn a_finger_that_hangs_is_parked_and_knows_its_sample() {
     let mut bench = Bench::new(3.0, 0.1);
@@ -181,7 +181,7 @@ fn it_comes_down_fast_until_it_touches_and_slowly_where_it_knows_the_sample() {
             bench.lever.lift(bench.way as i32);
             (bench.fast, bench.ms) = ((0.0, f32::INFINITY), 0);
             assert_eq!(bench.press().0, Ok(()));
-            // half of what shows contact, on the softest sample
+            // half of the contact threshold, on the softest sample
             assert!(bench.fast.0 * 11.5 < 17.25, "{:?}", bench.fast);
             assert!((-0.12..0.15).contains(&bench.fast.1), "{:?}", bench.fast);
         }

@@ -58,7 +58,7 @@ impl Bench {
         (0..ms).for_each(|_| self.tick(&[]));
     }
 
-    /// The arm says this about the last order for so long, ms.
+    /// Reports this about the last order for so long, ms.
     fn says(&mut self, state: ArmState, ms: u32) {
         for n in 0..ms {
             let number = self.sent.last().unwrap().1.number;
@@ -75,7 +75,7 @@ impl Bench {
         self.sent.last().unwrap().1.task
     }
 
-    /// Homed, and asked for a movement whose press is ordered.
+    /// Homed, with a movement whose press is ordered.
     fn pressing(movement: Movement) -> Self {
         let mut bench = Self::new();
         bench.run(50);
@@ -171,7 +171,7 @@ fn an_order_is_said_again_until_it_is_heard_and_reports_of_another_are_none() {
     assert_eq!(bench.sent.len(), heard);
 }
 
-/// Runs until there is a fault: the fault, and how many ms after `since` the stop was sent.
+/// Runs until there is a fault; returns it, and the time from `since` to the order to stop, ms.
 fn faulted(bench: &mut Bench, since: u32) -> (Fault, u32) {
     for _ in 0..60_000 {
         bench.run(1);
@@ -190,7 +190,7 @@ fn too_much_force_demands_a_stop_in_the_same_millisecond() {
     let mut bench = Bench::sliding(movement);
     bench.says(ArmState::Steady, 300);
     let since = bench.ms;
-    // 0.9 N where half a newton was asked for
+    // 0.9 N instead of half a newton
     bench.counts = 900.0 / bench.rig.calibration.pressure.force_mn_per_count;
     let (fault, ms) = faulted(&mut bench, since);
     assert_eq!(fault, Fault::ForceHigh);
@@ -198,7 +198,7 @@ fn too_much_force_demands_a_stop_in_the_same_millisecond() {
     assert!(ms <= 12, "{ms}");
     assert!(bench.outputs.lever_enabled);
     assert_eq!(bench.rig.reset(), Err(Refused::Busy));
-    // it heeds
+    // it obeys
     bench.counts = 0.0;
     bench.says(ArmState::Busy, 100);
     bench.says(ArmState::Lifted, 60);
@@ -238,10 +238,10 @@ fn a_silent_arm_is_told_to_stop_after_half_a_second() {
     let since = bench.ms;
     let (fault, ms) = faulted(&mut bench, since);
     assert_eq!(fault, Fault::ArmSilent);
-    // its last word was up to 50 ms before
+    // its last report was up to 50 ms before
     assert!((SILENT_MS - 50..=SILENT_MS + 2).contains(&ms), "{ms}");
     assert!(!bench.outputs.lever_enabled);
-    // that it stops does not make it another fault, nor does that it goes on to press
+    // its stop does not make it another fault, nor does further pressing
     bench.run(4000);
     assert_eq!(bench.rig.phase(), Phase::Faulted(Fault::ArmSilent));
 }
@@ -283,7 +283,7 @@ fn what_an_arm_says_is_compared_with_force_clock_and_order() {
     let mut bench = Bench::sliding(movement);
     bench.says(ArmState::Steady, slide_ms + slide_ms / 10 + RAMP_MS);
     assert_eq!(bench.rig.phase(), Phase::Faulted(Fault::ArmOff));
-    // it says that it presses, and does not; and presses with a quarter more
+    // it reports that it presses, and does not; and presses with a quarter more
     for times in [0.0, 0.8, 1.25] {
         let mut bench = Bench::pressing(movement);
         // not at once: a step of force looks like the beginning of a greater one
@@ -295,7 +295,7 @@ fn what_an_arm_says_is_compared_with_force_clock_and_order() {
         bench.says(ArmState::Pressed, SETTLE_MS + 5);
         assert_eq!(bench.rig.phase(), Phase::Faulted(Fault::ArmOff), "{times}");
     }
-    // it says that it is lifted, and is not
+    // it reports the finger as lifted, and it is not
     let mut bench = Bench::sliding(movement);
     bench.rig.stop();
     bench.run(1);

@@ -11,9 +11,9 @@ const PAC_PER_PDC: f32 = 99.1;
 /// A finger that comes down with 800 steps/s on a sample, as P_DC and P_AC show it.
 #[derive(Clone, Copy)]
 struct Press {
-    /// The sample's, mm/N.
+    /// Compliance of the sample, mm/N.
     compliance: f32,
-    /// Where the lever makes no more steps, or P_DC sticks, mm after contact.
+    /// Place from which the lever makes no more steps, or P_DC sticks, mm after contact.
     slips_mm: f32,
     sticks_mm: f32,
     /// Time in which the pressure runs out, s.
@@ -187,7 +187,7 @@ fn a_lever_that_slips_is_told_from_a_dead_pressure() {
     }
 }
 
-/// Up to the force that every rig may press whatever the leak, if it only holds a pressure for 0.2 s; up to 2 N where it is
+/// Up to the force that every rig may press with any leak, if it only holds a pressure for 0.2 s; up to 2 N where it is
 /// quick.
 #[test]
 fn a_leaking_skin_is_not_pressed_too_hard() {
@@ -237,7 +237,7 @@ fn what_is_not_looked_for_is_not_found() {
     );
 }
 
-/// A knock against the bench is over when it is over: P_AC swings back.
+/// A knock against the bench does not count after its end: P_AC swings back.
 #[test]
 fn a_knock_is_no_contact() {
     let mut progress = Progress::new(&BioTac::MODEL, Unguarded::default());

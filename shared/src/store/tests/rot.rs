@@ -195,8 +195,16 @@ proptest! {
 #[test]
 fn two_records_are_put_right_at_once_wherever_the_page_ends() {
     let mut turns = 0;
-    for rounds in 0..100 {
+    // a short record more moves the end of the page
+    let all = (0..100).flat_map(|rounds| {
         let (ram, _) = stored(rounds, 5);
+        (0..6).scan(open(ram), move |store, _| {
+            let ram = store.flash.clone().again();
+            block_on(store.set_high_force(rounds % 10 == 0)).unwrap();
+            Some((rounds, ram))
+        })
+    });
+    for (rounds, ram) in all {
         if written(&ram, 2).max(written(&ram, 3)) < SECTOR - 150 {
             continue;
         }

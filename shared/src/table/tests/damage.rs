@@ -114,7 +114,7 @@ fn every_check_names_what_is_wrong() {
     let at = |at: usize, byte: u8| error(&wrong(|bytes| bytes[at] = byte));
     let length = |header, contents| TableError::Length { header, contents };
     assert_eq!(at(3, b'Z'), TableError::Magic(*b"TACZ"));
-    assert_eq!(at(5, 1), TableError::Version(259));
+    assert_eq!(at(5, 1), TableError::Version(257));
     assert_eq!(at(6, 2), TableError::Method(2));
     assert_eq!(
         at(8, 200),
@@ -194,7 +194,7 @@ fn every_check_names_what_is_wrong() {
     );
     assert_eq!(
         named(b"\x01a\x01bc"),
-        Err(length(103, 102)),
+        Err(TableError::Sections),
         "a byte too many"
     );
     assert_eq!(
@@ -217,8 +217,8 @@ fn every_error_says_what_is_wrong() {
             "not a texture table: it begins with [50, 4b, 03, 04], not `TACT`",
         ),
         (
-            TableError::Version(1),
-            "version 1, and this program reads versions 3 to 6: learn the table anew",
+            TableError::Version(2),
+            "version 2, and this program reads version 1: learn the table anew, or use the program that wrote it",
         ),
         (TableError::Method(7), "method 7 is unknown"),
         (

@@ -9,7 +9,7 @@ const BANDS: FeatureSet = FeatureSet::Bands;
 /// Two textures, two movements and two features, field by field as the module's page has it: movements begin at byte
 /// 16, whitenings at 28, cells at 52, trials at 68, the lineage at 72, numbers and tallies at 76, names at 86.
 fn small_fused() -> Vec<u8> {
-    let mut bytes = b"TACT\x03\0\x01\x02\x67\0\0\0\x02\0\x02\x02".to_vec();
+    let mut bytes = b"TACT\x01\0\x01\x02\x67\0\0\0\x02\0\x02\x02".to_vec();
     bytes.extend(b"\xee\x04\x10\x27\0\0"); // 1262 mN, 10000 um/s
     bytes.extend(b"\xc8\0\x78\xf6\0\0"); // 200 mN, 63096 um/s
     bytes.extend(by_hand());
@@ -172,7 +172,7 @@ proptest! {
     #[test]
     fn no_bytes_behind_a_fused_header_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), set in 0u8..4, features in 0u8..15) {
         let length = (16 + bytes.len() + CRC_BYTES) as u32;
-        let mut begun = b"TACT\x03\0\x01".to_vec();
+        let mut begun = b"TACT\x01\0\x01".to_vec();
         begun.push(set);
         begun.extend(length.to_le_bytes());
         begun.extend([1, 0, 1, features]);

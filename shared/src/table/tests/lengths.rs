@@ -50,9 +50,8 @@ fn same_cells(table: &Table<'_>, at: u8, of: &Table<'_>, movement: u8) {
 }
 
 #[test]
-fn shorter_slides_are_further_movements_of_a_version_of_its_own() {
+fn shorter_slides_are_further_movements() {
     let bytes = with_two();
-    assert_eq!(bytes[4], 6, "version");
     let (whole, short, long) = (full(), of_length(100), of_length(-100));
     let [whole, short, long] = [&whole, &short, &long].map(|b| Table::read(b).unwrap());
     let table = Table::read(&bytes).unwrap();
@@ -202,9 +201,9 @@ fn damaged_lengths_are_refused() {
     };
     let refused = Err(TableError::Section(6));
     assert_eq!(damaged(&|_| ()), Ok(()));
-    // magic, contents, textures, movements and features are those of the table; so is every movement
+    // magic, version, contents, textures, movements and features are those of the table; so is every movement
     let header = first + 4 + 2;
-    for at in [0, 6, 7, 12, 14, 15, 16, 19, 27] {
+    for at in [0, 4, 6, 7, 12, 14, 15, 16, 19, 27] {
         assert_eq!(damaged(&|bytes| bytes[header + at] ^= 1), refused, "{at}");
     }
     // what nobody reads of it
@@ -240,12 +239,13 @@ fn damaged_lengths_are_refused() {
         refused,
         "twice"
     );
-    // lengths in an older version, and none in this one
-    for version in [4, 5] {
-        assert!(damaged(&|bytes| bytes[4] = version).is_err());
-    }
-    assert_eq!(damaged(&|bytes| bytes.truncate(first)), refused);
-    assert_eq!(damaged(&|bytes| bytes[4] = 7), Err(TableError::Version(7)));
+    let slopes = |bytes: &mut Vec<u8>| {
+        let length = crate::table::slopes::length(2, 4, 2);
+        bytes.extend([4, 0, length as u8, 0]);
+        bytes.resize(bytes.len() + length, 0);
+    };
+    assert_eq!(damaged(&slopes), refused, "slopes, too");
+    assert_eq!(damaged(&|bytes| bytes.truncate(first)), Ok(()));
     for length in 0..whole.len() {
         assert!(Table::read(&whole[..length]).is_err());
     }

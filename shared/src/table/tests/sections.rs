@@ -69,7 +69,6 @@ pub(super) fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
 #[test]
 fn sections_read_back_and_stay_when_textures_change() {
     let bytes = full();
-    assert_eq!(bytes[4], 4, "version");
     let table = Table::read(&bytes).unwrap();
     let agrees = |table: &Table<'_>| {
         assert_eq!(table.drift(), Some(Drift::default()));
@@ -101,30 +100,14 @@ fn sections_read_back_and_stay_when_textures_change() {
     let mut told = bytes.clone();
     retell(&mut told, 1, 0, &new[0], Tally::default()).unwrap();
     agrees(&Table::read(&told).unwrap());
-    // a table without any is as version 3 had it
+    // a table may have none
     let plain = fused_of(
         FeatureSet::Bands,
         &[straight(2)],
         &[vec![known(2, &[1.0, 2.0])]],
     );
     let plain = Table::read(&plain).unwrap();
-    assert_eq!(
-        (plain.as_bytes()[4], plain.drift(), plain.limits()),
-        (3, None, None)
-    );
-    assert_eq!(
-        amend(
-            &mut out,
-            &plain,
-            Change::Rename {
-                texture: 0,
-                name: "x"
-            }
-        )
-        .unwrap()
-        .as_bytes()[4],
-        3
-    );
+    assert_eq!((plain.drift(), plain.limits()), (None, None));
 }
 
 #[test]
@@ -206,15 +189,11 @@ fn damaged_sections_are_refused() {
             assert_eq!(found, error, "{what}");
         }
     }
-    // of version 3 there are none
-    let old = changed(|bytes, _| bytes[4] = 3);
-    assert!(matches!(Table::read(&old), Err(TableError::Length { .. })));
-    // and none in a table of Gaussians
+    // a table of Gaussians has none
     let mut gaussians = small();
     let section = full()[begin(&full())..][..20].to_vec();
     gaussians.truncate(gaussians.len() - CRC_BYTES);
     gaussians.extend(section);
-    gaussians[4] = 4;
     let length = (gaussians.len() + CRC_BYTES) as u32;
     gaussians[8..12].copy_from_slice(&length.to_le_bytes());
     assert_eq!(Table::read(&seal(gaussians)).unwrap_err(), drift);

@@ -18,7 +18,7 @@ use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::measure;
 use tactus_lab::remote::mcap::TABLE;
 
-use super::to::{To, create};
+use super::{To, create};
 use crate::cmd::device::log::{self, Line, TableParts};
 
 /// The channels, each with what its messages hold: a name, and JSON's word for what it is.

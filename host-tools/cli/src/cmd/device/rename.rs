@@ -78,8 +78,7 @@ struct What {
     #[arg(long, value_name = "NAME")]
     training: Option<String>,
     /// All that the probe has learned by itself; what it learned from you stays
-    // its name before the field's words came
-    #[arg(long, alias = "self-taught")]
+    #[arg(long)]
     self_learned: bool,
 }
 

@@ -10,7 +10,7 @@ use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::learn::Expected;
 use tactus_study::fabricslide::FabricSet;
 
-use crate::cmd::args::{Ending, Expecting, Features, Recordings, Stop};
+use crate::cmd::args::{Expecting, Features, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
@@ -39,12 +39,9 @@ episode of its own.
 --verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
 does, and counts the errors: at the limits, and where both are equal.
 These need the method fused.
---early looks at each slide at a few lengths, by a table that was learned from slides of those lengths, and says how much
-shorter explorations are when a slide ends as soon as the verdict is certain, and how much more often they are wrong.
 
 --plot draws what is told of each texture (confusion), how often it was right when it said 99 %
-(reliability), and slides and errors by threshold (slides-by-threshold, errors-by-threshold). With
---verify it draws one error against the other (trade-off).
+(reliability). With --verify it draws one error against the other (trade-off).
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
@@ -54,7 +51,6 @@ Examples:
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --fabrics DIR
   tactus evaluate --recordings DIR --verify --protocol blocked
-  tactus evaluate --recordings DIR --early --protocol blocked
   tactus evaluate --recordings DIR --lifelong")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -89,11 +85,6 @@ pub(crate) struct Args {
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with_all = ["lifelong", "novelty"])]
     pub(crate) verify: bool,
-    /// End a slide as soon as the verdict is certain, and count what that saves and what it costs
-    #[arg(long, conflicts_with_all = ["lifelong", "novelty", "verify", "properties", "fabrics", "test", "plot"])]
-    pub(crate) early: bool,
-    #[command(flatten)]
-    pub(crate) ending: Ending,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
     pub(crate) train_slides: Option<usize>,

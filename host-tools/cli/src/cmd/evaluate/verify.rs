@@ -8,7 +8,7 @@ use tactus_core::explorer::Config;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::Experiment;
 use tactus_lab::eval::show::count;
-use tactus_lab::eval::verify::{Told, Verified, verify};
+use tactus_lab::eval::verify::{AnswerShares, Verified, verify};
 use tactus_study::pictures::trade_off;
 
 use super::experiment::Args;
@@ -85,7 +85,7 @@ fn print(figures: &Figures, out: &mut impl Write) -> anyhow::Result<()> {
         ("its own slides", figures.verified.same),
         ("those of others", figures.verified.other),
     ] {
-        let Told {
+        let AnswerShares {
             same,
             different,
             unsure,

@@ -349,7 +349,7 @@ fn a_wrong_clock_phase_and_a_missing_select_are_noticed() {
     }
     // about every other one, where a few dozen in a second are a bad link to the guard
     assert!(bad > 50, "{bad} of 200 words are bad");
-    // right again, and nobody selected
+    // right again, and no part selected
     start_spi(&mut bench, 0);
     bench.write(0x4001_300C, 0x80);
     let ends = bench.board.part.next_event().unwrap();

@@ -1,9 +1,9 @@
-//! The flash and its accelerator (RM0090 3.5.1 and 3.5.2): lines of 128 bits that take so many wait states to read, the line in use,
-//! the one that is prefetched behind it, 64 lines of instructions and 8 of data that are kept, the least recently used one of
-//! them replaced first.
+//! The flash and its accelerator (RM0090 3.5.1 and 3.5.2): lines of 128 bits that take so many wait states to read, the
+//! line in use, the one that is prefetched behind it, 64 lines of instructions and 8 of data that are kept, the least
+//! recently used one of them replaced first.
 //!
-//! A line that the core has to wait for is a miss and is copied to the cache. One that was prefetched in time is not. A read that is under
-//! way is brought to its end whoever asks for another one. A load goes before a prefetch that has not begun.
+//! A line that the core has to wait for is a miss and is copied to the cache. One that was prefetched in time is not. A
+//! read that is under way is finished before any other one. A load goes before a prefetch that has not begun.
 
 /// Bytes of a line.
 const LINE: u32 = 16;
@@ -31,7 +31,7 @@ impl Cache {
         }
     }
 
-    /// Whether it has the line, which then is the latest.
+    /// Returns true if it has the line, which then is the latest.
     fn uses(&mut self, line: u32) -> bool {
         let at = self.lines.iter().position(|kept| *kept == line);
         if let Some(at) = at {
@@ -72,7 +72,7 @@ pub struct Accelerator {
     data: Cache,
     current: Option<u32>,
     ahead: Option<Ahead>,
-    /// The first cycle in which the array is not read any more, but for what is read ahead.
+    /// The first cycle in which the array is free, except for prefetches.
     free: u64,
 }
 
@@ -127,7 +127,7 @@ impl Accelerator {
         self.read(now)
     }
 
-    /// What is read ahead and has begun by now is brought to its end; what has not is not to begin.
+    /// Finishes the prefetch that has begun by now; cancels one that has not.
     fn finish(&mut self, now: u64) {
         if let Some(ahead) = self.ahead.take()
             && ahead.begins < now
@@ -152,7 +152,7 @@ impl Accelerator {
         }
         let ahead = self.ahead;
         let wait = self.read(now);
-        // what was prefetched stays, what was to be prefetched comes later
+        // a finished prefetch stays, a planned one comes later
         self.ahead = ahead.map(|ahead| match ahead.begins < now {
             true => ahead,
             false => Ahead {

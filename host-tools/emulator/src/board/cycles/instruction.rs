@@ -1,5 +1,6 @@
-//! What an instruction takes on a Cortex-M4F, by its manual's numbers without wait states (ARM 100166, tables 3-1 and 7-1, and
-//! 3.3.2 on pairs of loads), and what it does that makes it wait: where it reads or writes, whether it may branch.
+//! Cycles of an instruction on a Cortex-M4F, by its manual's numbers without wait states (ARM 100166, tables 3-1 and
+//! 7-1, and 3.3.2 on pairs of loads), and its properties that make it wait: the address that it reads or writes, and
+//! its branch.
 
 /// Cycles of a division, 2 to 12.
 const DIVIDE: u32 = 12;
@@ -8,7 +9,7 @@ const FLOAT_MULTIPLY_ADD: u32 = 3;
 /// Barriers, and writes to the core's special registers.
 const BARRIER: u32 = 4;
 
-/// Where an instruction may go on, if not behind itself.
+/// The target of an instruction's branch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Branch {
     No,
@@ -57,7 +58,7 @@ pub(super) struct Instruction {
     pub(super) drains: bool,
     /// A load of one register of the core: this one. Loads behind it may be a cycle shorter.
     pub(super) loads: Option<u8>,
-    /// What it has to do with the FPU.
+    /// Its use of the FPU.
     pub(super) float: Option<Float>,
 }
 

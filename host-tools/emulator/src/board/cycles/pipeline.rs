@@ -1,18 +1,18 @@
-//! The core's pipeline: what one instruction after the other takes.
+//! The core's pipeline: cycles of one instruction after the other.
 
 use super::accelerator::Accelerator;
 use super::instruction::{Access, Address, Branch, Instruction};
 
-/// Cycles in which the pipeline is filled anew, of the manual's 1 to 3: the target is fetched early if the instruction has it, and
-/// takes a cycle more if it is of 32 bits across two words.
+/// Cycles in which the pipeline is filled anew, of the manual's 1 to 3: the target is fetched early if the instruction
+/// has it, and takes a cycle more if it is of 32 bits across two words.
 const REFILL_DIRECT: u64 = 1;
 const REFILL_INDIRECT: u64 = 2;
 /// Into an exception's handler, back from it, and from one to the next.
 const ENTRY: u64 = 12;
 const RETURN: u64 = 10;
 const TAIL_CHAIN: u64 = 6;
-/// Of the entry, nine cycles put registers on the stack; meanwhile the vector is read and the handler's first instruction fetched, which
-/// take six and what they wait (ARM's article 103489845 on interrupt latency).
+/// Of the entry, nine cycles put registers on the stack; meanwhile the vector is read and the handler's first
+/// instruction fetched, which take six and their waits (ARM's article 103489845 on interrupt latency).
 const ENTRY_HIDES: u64 = 9 - 6;
 /// S0 to S15 and FPSCR, put aside at the first instruction of a handler for the FPU, and brought back at its end.
 const FLOATS: u64 = 17;
@@ -38,15 +38,15 @@ fn is_flash(address: u32) -> bool {
 pub struct Executed {
     /// Its address.
     pub at: u32,
-    /// Its halves; of a short one, and what follows it.
+    /// Its halves; of a short one, with the next half behind it.
     pub code: [u16; 2],
     /// The address of the next one.
     pub next: u32,
-    /// Where it read or wrote, if it did and it is known. The address of a literal need not be told.
+    /// The address that it read or wrote, if known. The address of a literal may be left out.
     pub data: Option<u32>,
 }
 
-/// What the last instruction leaves for the next one.
+/// The effects of the last instruction on the next one.
 #[derive(Clone, Copy, Default, Debug)]
 struct Before {
     /// It loaded this register of the core.
@@ -155,7 +155,7 @@ impl Core {
         self.cycles = self.cycles.max(self.drained);
     }
 
-    /// Whether it shares a cycle with the load before it: its address does not depend on what that loads.
+    /// Returns true if it shares a cycle with the load before it: its address does not depend on that load's value.
     fn is_pipelined(&self, access: &Access, instruction: &Instruction) -> bool {
         let Some(loaded) = self.before.loads else {
             return false;
@@ -169,8 +169,9 @@ impl Core {
         is_single && instruction.cycles > 1 && !depends
     }
 
-    /// Cycles that a load or store waits for memory. A store's last word does so in the write buffer (one entry, for the data buses of
-    /// code and system, ARM DDI 0337 3.5 and 100166 3.3.2): peripherals are device memory, which is buffered (ARM DDI 0403 B3.1).
+    /// Cycles that a load or store waits for memory. A store's last word does so in the write buffer (one entry, for
+    /// the data buses of code and system, ARM DDI 0337 3.5 and 100166 3.3.2): peripherals are device memory, which is
+    /// buffered (ARM DDI 0403 B3.1).
     fn wait(&mut self, executed: &Executed, access: &Access, issued: u64) -> u64 {
         let address = match access.address {
             Address::Literal(offset) => Some(literal(executed.at, offset)),
@@ -214,7 +215,7 @@ impl Core {
         self.cycles - began
     }
 
-    /// A handler is over; cycles until what it interrupted goes on, none if another handler is next.
+    /// A handler ends; returns the cycles until the interrupted code continues, none if another handler is next.
     pub fn leave(&mut self, chained: bool) -> u64 {
         let began = self.cycles;
         let used = self.handlers.pop() == Some(true);
@@ -228,7 +229,7 @@ impl Core {
     }
 }
 
-/// Where a literal is, from an instruction and its offset.
+/// Address of a literal, from an instruction and its offset.
 fn literal(at: u32, offset: i32) -> u32 {
     ((at + 4) & !3).wrapping_add_signed(offset)
 }

@@ -13,7 +13,7 @@ use super::pipeline::{Core, Executed};
 use crate::board::handlers::Handlers;
 use crate::board::registers::{register, word};
 
-/// What is spent is kept for so long a time each, ns.
+/// Length of a bin of the profile, ns.
 const BIN_NS: u64 = 250_000;
 /// Windows are of 1 ms and begin at any of these.
 const BINS: u64 = 4;
@@ -25,14 +25,14 @@ const RETURN: u32 = 24;
 
 /// Instructions, and the cycles that they take by the model.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Spent {
+pub struct CycleCount {
     /// Instructions.
     pub instructions: u64,
     /// Cycles, with those of exceptions that are entered and left.
     pub cycles: u64,
 }
 
-impl Spent {
+impl CycleCount {
     /// Cycles per instruction; 0 of none.
     pub fn ratio(self) -> f64 {
         match self.instructions {
@@ -42,14 +42,14 @@ impl Spent {
     }
 }
 
-impl AddAssign for Spent {
+impl AddAssign for CycleCount {
     fn add_assign(&mut self, other: Self) {
         self.instructions += other.instructions;
         self.cycles += other.cycles;
     }
 }
 
-impl Sum for Spent {
+impl Sum for CycleCount {
     fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
         let mut sum = Self::default();
         parts.for_each(|part| sum += part);
@@ -57,39 +57,39 @@ impl Sum for Spent {
     }
 }
 
-/// What was spent in one millisecond.
+/// The cycles of one millisecond.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Load {
-    /// When it began, ns of virtual time.
+    /// Its beginning, ns of virtual time.
     pub at_ns: u64,
-    /// What was spent.
-    pub spent: Spent,
+    /// The cycles.
+    pub spent: CycleCount,
 }
 
-/// What was spent, in parts of a millisecond and by groups of handlers; the last group is all the rest.
+/// Cycles in parts of a millisecond and by groups of handlers; the last group is all the rest.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct CycleProfile {
-    bins: BTreeMap<u64, Vec<Spent>>,
+    bins: BTreeMap<u64, Vec<CycleCount>>,
     /// Instructions that were executed outside of the image's code, which are not modelled.
     pub unseen: u64,
 }
 
 impl CycleProfile {
-    fn add(&mut self, at_ns: u64, groups: usize, group: usize, spent: Spent) {
+    fn add(&mut self, at_ns: u64, groups: usize, group: usize, spent: CycleCount) {
         let bin = self.bins.entry(at_ns / BIN_NS);
-        let bin = bin.or_insert_with(|| vec![Spent::default(); groups]);
+        let bin = bin.or_insert_with(|| vec![CycleCount::default(); groups]);
         if let Some(so_far) = bin.get_mut(group) {
             *so_far += spent;
         }
     }
 
-    /// With what was spent later, or before.
+    /// Adds a later, or an earlier, profile.
     pub fn extend(&mut self, other: Self) {
         for (bin, spent) in other.bins {
             let here = self
                 .bins
                 .entry(bin)
-                .or_insert_with(|| vec![Spent::default(); spent.len()]);
+                .or_insert_with(|| vec![CycleCount::default(); spent.len()]);
             here.iter_mut()
                 .zip(spent)
                 .for_each(|(here, spent)| *here += spent);
@@ -97,8 +97,8 @@ impl CycleProfile {
         self.unseen += other.unseen;
     }
 
-    /// All that was spent by some groups.
-    pub fn total(&self, groups: Range<usize>) -> Spent {
+    /// The sum of some groups.
+    pub fn total(&self, groups: Range<usize>) -> CycleCount {
         let bins = self.bins.values();
         bins.flat_map(|bin| bin.get(groups.clone()))
             .flatten()
@@ -107,12 +107,12 @@ impl CycleProfile {
     }
 
     /// The millisecond in which some groups spent most by a measure, of those in which they did something all the time.
-    pub fn worst(&self, groups: Range<usize>, measure: fn(Spent) -> f64) -> Load {
+    pub fn worst(&self, groups: Range<usize>, measure: fn(CycleCount) -> f64) -> Load {
         let mut worst = Load::default();
         for first in self.bins.keys() {
             let bins = self.bins.range(first..&(first + BINS));
             let bins = bins.map(|(_, bin)| bin.get(groups.clone()).unwrap_or_default());
-            let bins: Vec<Spent> = bins.map(|bin| bin.iter().copied().sum()).collect();
+            let bins: Vec<CycleCount> = bins.map(|bin| bin.iter().copied().sum()).collect();
             let is_whole = bins.len() as u64 == BINS;
             let spent = bins.into_iter().sum();
             if is_whole && measure(spent) > measure(worst.spent) {
@@ -124,7 +124,7 @@ impl CycleProfile {
     }
 }
 
-/// An instruction that the core has arrived at, and what becomes known of it until it arrives at the next one.
+/// An instruction that the core has arrived at, and its effects until the core arrives at the next one.
 struct Pending {
     at: u32,
     at_ns: u64,
@@ -145,15 +145,15 @@ pub(crate) struct Tracer {
     groups: usize,
     decoded: FxHashMap<u32, ([u16; 2], Instruction)>,
     pending: Option<Pending>,
-    /// Not 0 there: what is executed counts.
+    /// Instructions count while this is not 0.
     switch: Option<u32>,
     counts: bool,
     pub(crate) profile: CycleProfile,
 }
 
 impl Tracer {
-    /// Follows all code there from now on. Handlers are told apart by their groups. With a switch, what is executed counts while
-    /// the word at that address is not 0.
+    /// Follows all code there from now on. Handlers are distinguished by their groups. With a switch, instructions
+    /// count while the word at that address is not 0.
     pub(crate) fn new(
         code: Vec<Range<u64>>,
         groups: &[Vec<u64>],
@@ -199,7 +199,7 @@ impl Tracer {
         Some(Watch::Writes { address, length })
     }
 
-    /// Whether to be told of each instruction, which costs most of the speed.
+    /// Sets whether each instruction is traced, which costs most of the speed.
     fn follow(&self, follows: bool, host: &mut dyn Host) {
         for address in self.code.iter().flat_map(|range| range.clone().step_by(2)) {
             let watch = Watch::Instruction(address);
@@ -220,7 +220,7 @@ impl Tracer {
         self.profile
     }
 
-    /// What was spent since the last call.
+    /// Takes the profile since the last call.
     pub(crate) fn take(&mut self) -> CycleProfile {
         std::mem::take(&mut self.profile)
     }
@@ -232,7 +232,7 @@ impl Tracer {
     }
 
     fn spend(&mut self, at_ns: u64, group: usize, instructions: u64, cycles: u64) {
-        let spent = Spent {
+        let spent = CycleCount {
             instructions,
             cycles,
         };
@@ -277,7 +277,7 @@ impl Tracer {
             let length = pending.instruction.length;
             let next = match returns_to {
                 Some(next) => next,
-                // what it takes to come back is the exception's
+                // the cycles of the return are the exception's
                 None if left > 0 => pending.at + length,
                 None => hit.address as u32,
             };
@@ -335,7 +335,7 @@ fn word_at(at: u32, host: &mut dyn Host) -> u32 {
     low >> 16 | word((at & !3) + 4, host) << 16
 }
 
-/// The address of a load, by the registers as they are before it; what is on the stack is in RAM.
+/// The address of a load, by the registers as they are before it; the stack is in RAM.
 fn resolve(address: Address, host: &mut dyn Host) -> Option<u32> {
     let mut value = |number: u8| register(host, number.into());
     match address {
@@ -352,8 +352,8 @@ fn resolve(address: Address, host: &mut dyn Host) -> Option<u32> {
 mod tests {
     use super::*;
 
-    fn spent(instructions: u64, cycles: u64) -> Spent {
-        Spent {
+    fn spent(instructions: u64, cycles: u64) -> CycleCount {
+        CycleCount {
             instructions,
             cycles,
         }
@@ -370,10 +370,13 @@ mod tests {
         }
         // a single one is no millisecond
         profile.add(100 * BIN_NS, 2, 0, spent(1, 1000));
-        let worst = profile.worst(0..1, Spent::ratio);
+        let worst = profile.worst(0..1, CycleCount::ratio);
         assert_eq!(worst.spent, spent(400, 1000));
         assert_eq!(worst.at_ns, 4 * BIN_NS);
-        assert_eq!(profile.worst(0..2, Spent::ratio).spent, spent(600, 1200));
+        assert_eq!(
+            profile.worst(0..2, CycleCount::ratio).spent,
+            spent(600, 1200)
+        );
         assert_eq!(profile.total(1..2), spent(500, 500));
         assert_eq!(profile.total(0..2).instructions, 1501);
     }

@@ -1,4 +1,4 @@
-//! What a converter wants before software starts it.
+//! The conditions for starting a converter by software.
 
 use std::collections::BTreeMap;
 
@@ -27,8 +27,8 @@ const STREAMS: usize = 8;
 pub(super) struct Converters(BTreeMap<&'static str, u64>);
 
 impl Converters {
-    /// A store to CR2 of a converter on a bus of so many MHz, with CR2 before and after it: what is wrong, or `None` if it
-    /// starts no conversion. `word` is a register of a peripheral as the firmware set it.
+    /// A store to CR2 of a converter on a bus of so many MHz, with CR2 before and after it: returns the violation, or
+    /// `None` if it starts no conversion. `word` is a register of a peripheral as the firmware set it.
     pub(super) fn store(
         &mut self,
         of: &'static Peripheral,
@@ -48,7 +48,7 @@ impl Converters {
         if after & ADON == 0 || at_ns < on_ns + STEADY_NS {
             wrong.push((Rule::Unsteady, of.name.to_owned()));
         }
-        // RM0090 13.8.1: without DDS the stream's last transfer is the last that is asked for
+        // RM0090 13.8.1: without DDS the stream's last transfer is the last request
         if after & (CONT | DMA | DDS) == CONT | DMA && fills_a_ring(of, &word) {
             wrong.push((Rule::RequestsEnd, of.name.to_owned()));
         }
@@ -61,7 +61,7 @@ impl Converters {
     }
 }
 
-/// Whether a stream that takes a converter's data begins again at its end.
+/// Returns true if a stream that takes a converter's data begins again at its end.
 fn fills_a_ring(of: &Peripheral, word: impl Fn(&str, &str) -> u32) -> bool {
     let controllers = METADATA.peripherals.iter().filter(|peripheral| {
         let registers = peripheral.registers.as_ref();

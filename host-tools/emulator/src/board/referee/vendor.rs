@@ -1,4 +1,4 @@
-//! What the vendor says of the chip's registers: stm32-metapac's metadata and, of reset values and fields, ST's SVD.
+//! The vendor's facts about the chip's registers: stm32-metapac's metadata and, of reset values and fields, ST's SVD.
 
 use std::sync::OnceLock;
 
@@ -12,7 +12,7 @@ use stm32_metapac::metadata::{METADATA, PeripheralRccRegister};
 /// Peripherals lie in pages of this many bytes, some in one page together.
 const PAGE: u64 = 0x400;
 
-/// What is known of a word of a peripheral.
+/// The facts about a word of a peripheral.
 #[derive(Clone, Debug)]
 pub(crate) struct Word {
     /// "SPI1.CR1"
@@ -34,7 +34,7 @@ impl Word {
     }
 }
 
-/// Where a field is: its word, and its bits.
+/// The place of a field: its word, and its bits.
 pub(crate) type Place = (u64, u32);
 
 /// All registers, by address.
@@ -47,7 +47,7 @@ pub(crate) struct Vendor {
     addresses: FxHashMap<String, u64>,
     /// By names as "SPI1.CR1.SPE".
     fields: FxHashMap<String, Place>,
-    /// What enables each of [`METADATA`]'s peripherals, and what holds it in reset.
+    /// The field that enables each of [`METADATA`]'s peripherals, and the one that holds it in reset.
     switches: Vec<[Option<Place>; 2]>,
 }
 
@@ -88,7 +88,7 @@ fn bits(field: &Field) -> u32 {
     all.fold(0, |bits, at| bits | each << at)
 }
 
-/// A field set and what it extends.
+/// A field set and the ones that it extends.
 fn field_sets<'a>(ir: &'a IR, name: &'a str) -> impl Iterator<Item = &'a FieldSet> {
     let find = |name: &str| ir.fieldsets.iter().find(|set| same(set.name, name));
     std::iter::successors(find(name), move |set| find(set.extends?))
@@ -106,7 +106,7 @@ fn items<'a>(ir: &'a IR, name: &'a str) -> impl Iterator<Item = &'a BlockItem> {
         .flat_map(|block| block.items)
 }
 
-/// Every register of a block: its name, where it is, and itself.
+/// Every register of a block: its name, its place, and itself.
 fn registers(ir: &'static IR, block: &'static str) -> Vec<(String, u32, &'static Register)> {
     let mut found = Vec::new();
     for item in items(ir, block) {
@@ -131,7 +131,7 @@ fn registers(ir: &'static IR, block: &'static str) -> Vec<(String, u32, &'static
 }
 
 impl Vendor {
-    /// All that is known; the reset values are those of `bus`, of which there is one kind.
+    /// All facts; the reset values are those of `bus`, of which there is one kind.
     pub(crate) fn of(bus: &Bus) -> &'static Self {
         static VENDOR: OnceLock<Vendor> = OnceLock::new();
         VENDOR.get_or_init(|| Self::new(bus))
@@ -165,7 +165,7 @@ impl Vendor {
                 }
                 let spec = specified.get(&address);
                 addresses.insert(name.clone(), word);
-                // one word has several names where what it means depends on another: all their fields may be written
+                // one word has several names if its meaning depends on another: all their fields may be written
                 let word = words.entry(word).or_insert_with(|| Word {
                     name,
                     peripheral: number,
@@ -198,7 +198,7 @@ impl Vendor {
         }
     }
 
-    /// What lies at an address of a peripheral's page; `None` without one.
+    /// The word at an address of a peripheral's page; `None` without one.
     pub(crate) fn at(&self, address: u64) -> Option<Result<&Word, usize>> {
         if let Some(word) = self.words.get(&(address & !3)) {
             return Some(Ok(word));
@@ -206,19 +206,19 @@ impl Vendor {
         self.pages.get(&(address / PAGE)).map(|page| Err(*page))
     }
 
-    /// Where a register is: "SPI1" and "CR1".
+    /// The address of a register: "SPI1" and "CR1".
     pub(crate) fn address(&self, peripheral: &str, register: &str) -> Option<u64> {
         let name = format!("{peripheral}.{register}");
         self.addresses.get(&name).copied()
     }
 
-    /// Where a field is: "SPI1", "CR1" and "SPE".
+    /// The place of a field: "SPI1", "CR1" and "SPE".
     pub(crate) fn field(&self, peripheral: &str, register: &str, field: &str) -> Option<Place> {
         let name = format!("{peripheral}.{register}.{field}");
         self.fields.get(&name).copied()
     }
 
-    /// What enables a peripheral, and what holds it in reset.
+    /// The field that enables a peripheral, and the one that holds it in reset.
     pub(crate) fn switches(&self, peripheral: usize) -> [Option<Place>; 2] {
         self.switches.get(peripheral).copied().unwrap_or_default()
     }

@@ -1,8 +1,8 @@
-//! What a firmware may not do, and what it did.
+//! The rules for a firmware, and its violations.
 
 use std::fmt;
 
-/// What a firmware may not do.
+/// The rules: a firmware may not do this.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum Rule {
     /// Use a peripheral whose clock is off.
@@ -51,7 +51,8 @@ pub enum Rule {
     FlashBusy,
     /// Run faster than the wait states of the flash allow.
     WaitStates,
-    /// Run with wait states for a millisecond, and without the prefetch and the instruction cache that make up for them.
+    /// Run with wait states for a millisecond, and without the prefetch and the instruction cache that make up for
+    /// them.
     Accelerator,
     /// Run a bus faster than it may.
     BusClock,
@@ -59,27 +60,27 @@ pub enum Rule {
     WatchdogKey,
     /// Unmask an edge of a pin that is no input.
     EdgeOfNoInput,
-    /// What the models report themselves: an address that nothing is at, an access that is refused, a wrong use.
+    /// Any error that the models report themselves: an empty address, an access that is refused, a wrong use.
     Model,
 }
 
-/// Something that the firmware may not do.
+/// A violation of a rule.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Violation {
-    /// What was broken.
+    /// The rule.
     pub rule: Rule,
-    /// Where and how.
+    /// Its place and details.
     pub what: String,
-    /// When first, ns.
+    /// Time of the first, ns.
     pub at_ns: u64,
     /// The instruction that did it first.
     pub instruction: Option<u64>,
-    /// How often.
+    /// Number of times.
     pub times: u64,
 }
 
 impl Violation {
-    /// What rigless' models report.
+    /// A report of rigless' models.
     pub(in super::super) fn of_models(what: String) -> Self {
         Self {
             rule: Rule::Model,

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_world::world::Setup;
 
 use super::error::BenchError;
 use super::workload::{self, Counter, Workload};
-use crate::board::cycles::Spent;
+use crate::board::cycles::CycleCount;
 use crate::board::{Emulator, Options};
 
 /// What the chip found.
@@ -151,10 +151,10 @@ impl Bench {
         // what the one before has left
         self.emulator.cycle_profile()?;
         let (instructions, results) = self.send(workload, table, words)?;
-        let spent: Spent = self.emulator.cycle_profile()?.total(0..1);
+        let spent: CycleCount = self.emulator.cycle_profile()?.total(0..1);
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);
-        workload::run::<Plain>(workload, &self.plan, table, words, &mut Uncounted, &mut put)
+        workload::run(workload, &self.plan, table, words, &mut Uncounted, &mut put)
             .ok_or_else(|| unsuitable(workload, "its words make no sense"))?;
         let instructions = instructions.saturating_sub(self.overhead);
         // the few instructions round them are told apart by what they take on the average

@@ -9,7 +9,7 @@ use tactus_core::wire::{Command, Counts, Event, Identify, Phase};
 use tactus_link::Request;
 use tactus_world::world::Setup;
 
-use crate::board::cycles::{CycleProfile, Load, Spent};
+use crate::board::cycles::{CycleCount, CycleProfile, Load};
 use crate::board::{Emulator, Options, Timing};
 use crate::host::talk::{Talk, TalkError};
 
@@ -30,7 +30,7 @@ const SERVO: [&str; 1] = ["UART5"];
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Share {
     /// In all.
-    pub total: Spent,
+    pub total: CycleCount,
     /// The millisecond with the most cycles per instruction.
     pub slowest: Load,
     /// The millisecond with the most cycles.
@@ -41,7 +41,7 @@ impl Share {
     fn of(profile: &CycleProfile, groups: std::ops::Range<usize>) -> Self {
         Self {
             total: profile.total(groups.clone()),
-            slowest: profile.worst(groups.clone(), Spent::ratio),
+            slowest: profile.worst(groups.clone(), CycleCount::ratio),
             busiest: profile.worst(groups, |spent| spent.cycles as f64),
         }
     }
@@ -59,9 +59,9 @@ pub struct Cycles {
     /// Seconds of the slide ...
     pub slide_s: f64,
     /// ... what was executed meanwhile ...
-    pub slide: Spent,
+    pub slide: CycleCount,
     /// ... and by the acquisition.
-    pub slide_acquisition: Spent,
+    pub slide_acquisition: CycleCount,
     /// Instructions that were not modelled.
     pub unseen: u64,
 }

@@ -23,15 +23,4 @@ pub(crate) enum BenchError {
     Different(Vec<String>),
     #[error("the rig's image: {0}")]
     Rig(&'static str),
-    /// The curves.
-    #[cfg(feature = "plot")]
-    #[error(transparent)]
-    Draw(#[from] tactus_study::chart::DrawError),
-    #[error(transparent)]
-    Write(#[from] crate::host::args::WriteError),
-    #[cfg(not(feature = "plot"))]
-    #[error(
-        "built without the feature `plot`: `cargo xtask bench --growth --plot FILE` builds with it"
-    )]
-    NoPlot,
 }

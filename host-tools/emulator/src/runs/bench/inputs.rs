@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus_core::explorer::kernels::MOST_SQUARE;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{
     FeatureSet, MAX_FEATURES, Movement, Observation, Properties, Property, PropertySet,
@@ -62,7 +61,7 @@ const MOVEMENTS: [Movement; 3] = [
 ];
 
 /// A table of so many textures, neighbours hard to tell apart, each learned from 5 slides of 3 movements.
-pub(super) fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
+fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let names: Vec<String> = (1..=textures).map(|t| format!("texture {t}")).collect();
     let slides: Vec<Vec<Vec<Observation>>> = names
@@ -97,158 +96,20 @@ pub(super) fn of_gates(method: Method) -> Result<Vec<u8>, BenchError> {
     synthetic(method, OF_GATES)
 }
 
-/// Signals and whitened means that the figures below do not go through: any number of samples, beyond what 12 bits can differ
-/// by; means near and far, and as far from the middle as the kernel takes them.
+/// Compares signals that the figures below do not go through: any number of samples, beyond what 12 bits can differ by.
 pub(super) fn extremes(bench: &mut Bench) -> Result<(), BenchError> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    let mut check = |what: String, workload, words: &[i16]| {
-        let counted = bench.count(workload, &[], words)?;
-        let different = || BenchError::Different(vec![what]);
-        counted.equal.then_some(()).ok_or_else(different)
-    };
     for samples in (1..20).map(|n| 31 * n).chain([264, 330, 1000]) {
         let reach = *[30.0, 4096.0, 32767.0].choose(&mut random).unwrap_or(&1.0);
         let words: Vec<i16> = (0..samples)
             .map(|_| random.random_range(-reach..=reach) as i16)
             .collect();
-        check(
-            format!("samples: {samples}, reach: {reach}"),
-            Workload::BandPower,
-            &words,
-        )?;
-    }
-    for round in 0..60 {
-        let (slides, textures) = (random.random_range(1..=255), random.random_range(2..60));
-        // the largest has a sum of squares just below the bound
-        let bound = f64::from(MOST_SQUARE - 1) / MAX_FEATURES as f64;
-        let reach = [300.0, 3000.0, bound.sqrt()][round % 3];
-        let corners = random.random_bool(0.3);
-        let mut words = vec![slides];
-        for _ in 0..textures * MAX_FEATURES {
-            let at: f64 = random.random_range(-1.0..=1.0);
-            words.push((reach * if corners { at.signum() } else { at }) as i16);
-        }
-        check(
-            format!("{textures} means to {reach}"),
-            Workload::Confuse,
-            &words,
-        )?;
+        let what = format!("samples: {samples}, reach: {reach}");
+        let counted = bench.count(Workload::BandPower, &[], &words)?;
+        let different = || BenchError::Different(vec![what]);
+        counted.equal.then_some(()).ok_or_else(different)?;
     }
     Ok(())
-}
-
-/// Posteriors that the figures below do not go through: few textures and odd numbers of them, all numbers of features,
-/// textures too far away for the chip's short way, learned from different numbers of slides, or not at all, and values far
-/// from all.
-pub(super) fn corners(bench: &mut Bench) -> Result<(), BenchError> {
-    let mut random = ChaCha8Rng::seed_from_u64(4);
-    for textures in [3, 8, 21] {
-        for (set, far) in FeatureSet::ALL
-            .into_iter()
-            .zip([false, true].iter().cycle())
-        {
-            for uneven in [false, true] {
-                let slides = corner(&mut random, textures, set, *far || uneven, uneven);
-                let what = format!("textures: {textures}, by {}, uneven: {uneven}", set.name());
-                for method in [Method::Fused, Method::Paper] {
-                    let names: Vec<String> = (0..textures).map(|t| format!("t{t}")).collect();
-                    let set = (method == Method::Fused).then_some(set);
-                    if set.is_none()
-                        && slides
-                            .iter()
-                            .flatten()
-                            .flatten()
-                            .any(|s| s.properties == Properties::default())
-                    {
-                        continue;
-                    }
-                    let table = learn::learn(method, set, &names, &MOVEMENTS, &slides)?;
-                    for _ in 0..3 {
-                        // a texture lacks slides of movement 1, and without them the paper's methods cannot look there
-                        let movement = match (uneven, method) {
-                            (true, Method::Fused) => 1,
-                            (true, _) => 0,
-                            (false, _) => random.random_range(0..3),
-                        };
-                        let texture = random.random_range(0..textures);
-                        let observed = slides[texture][movement].first();
-                        let observed = observed.or(slides[0][0].first());
-                        let no_slide = || unsuitable(&what, "a texture without a slide");
-                        let mut slide = observed.ok_or_else(no_slide)?.clone();
-                        if set.is_none() && random.random() {
-                            slide.properties = Properties::new([Some(1e6), Some(-1e6), Some(0.0)]);
-                        }
-                        let action = Action {
-                            movement: movement as u8,
-                            property: set
-                                .is_none()
-                                .then_some(Property::ALL[random.random_range(0..3)]),
-                        };
-                        let mut words = Vec::new();
-                        ObservedSlide {
-                            method,
-                            action,
-                            slide,
-                        }
-                        .write(|word| words.push(word));
-                        let counted = bench.count(Workload::Observe, &table, &words)?;
-                        if !counted.equal {
-                            return Err(BenchError::Different(vec![format!("{what}, {method:?}")]));
-                        }
-                    }
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Slides of textures, movement by movement; some from fewer where they are `uneven`, one from none.
-fn corner(
-    random: &mut ChaCha8Rng,
-    textures: usize,
-    set: FeatureSet,
-    far: bool,
-    uneven: bool,
-) -> Vec<Vec<Vec<Observation>>> {
-    let (reach, scatter) = if far { (15.0, 0.02) } else { (3.0, 0.5) };
-    let mut texture = |texture: usize| {
-        let mut slides_at = |movement: usize| {
-            let centres: Vec<f32> = (0..17)
-                .map(|_| random.random_range(-reach..reach))
-                .collect();
-            let slides = match (uneven, movement, texture) {
-                (true, 1, 1) => 0,
-                (true, _, _) => 2 + texture % 3,
-                _ => 5,
-            };
-            let mut slide = |_| {
-                let observed: Vec<f32> = centres
-                    .iter()
-                    .map(|c| c + random.random_range(-scatter..scatter))
-                    .collect();
-                let fixed = |x: &f32| tactus_core::features::fixed(*x).unwrap_or(0);
-                let properties = match set {
-                    FeatureSet::Pressure | FeatureSet::Bands => [None; 3],
-                    _ => [
-                        Some(observed[0] / 4.0),
-                        Some(observed[1] / 2.0),
-                        Some(observed[2] / 4.0),
-                    ],
-                };
-                Observation {
-                    properties: Properties::new(properties),
-                    pressure: (set == FeatureSet::Pressure)
-                        .then(|| [fixed(&observed[3]), fixed(&observed[4])]),
-                    pace: None,
-                    bands: observed[5..].iter().map(fixed).collect(),
-                }
-            };
-            (0..slides).map(&mut slide).collect()
-        };
-        (0..MOVEMENTS.len()).map(&mut slides_at).collect()
-    };
-    (0..textures).map(&mut texture).collect()
 }
 
 /// An observed slide, as words, and how many textures it leaves.

@@ -11,7 +11,7 @@ use tactus_lab::sim::recorded::RecordedTexture;
 use crate::board::Options;
 use crate::host::exploration::{Exploration, ExploreError, explore};
 use crate::host::talk::Talk;
-use crate::host::under_finger::{self, Known, KnownError, TRIALS, Unknown};
+use crate::host::under_finger::{self, FirmwareData, KnownError, TRIALS, Unknown};
 
 /// Textures of the simulated world's table.
 const AMONG: u8 = 20;
@@ -22,7 +22,7 @@ pub struct Group {
     /// What it is called in reports.
     pub name: &'static str,
     /// What the firmware is told.
-    pub known: Known,
+    pub known: FirmwareData,
     /// What lies under the finger, exploration by exploration.
     pub unknown: Vec<Unknown>,
     /// How it decides.
@@ -116,7 +116,7 @@ fn one(elf: &Path, group: &Group, index: usize) -> Result<Exploration, ExploreEr
     let unknown = &group.unknown[index];
     let mut talk = Talk::new(unknown.start(elf, Options::default())?);
     talk.ready(|_, _| ())?;
-    let Known { calibration, table } = &group.known;
+    let FirmwareData { calibration, table } = &group.known;
     talk.teach(calibration, table, |_, _| ())?;
     let identify = Identify {
         method: Some(group.method.method()),

@@ -6,7 +6,7 @@ use embassy_futures::block_on;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
-use tactus_core::dsp::{self, Plain};
+use tactus_core::dsp;
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::store::{Store, StoreError};
 use tactus_core::wire::{Command, Event, Forget, Identify, MemoryError, Text, Verdict, text};
@@ -184,7 +184,7 @@ pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Resul
 
 /// Sends the probe a command, as a host would; the error says why it refuses.
 fn send(probe: &mut Probe<'_>, command: Command) -> Result<(), Box<Text>> {
-    block_on(probe.perform::<Plain>(&command)).map_err(|why| Box::new(text(why)))
+    block_on(probe.perform(&command)).map_err(|why| Box::new(text(why)))
 }
 
 fn now_s(probe: &mut Probe<'_>) -> f64 {

@@ -1,10 +1,10 @@
 //! Reader of folders like `data/biotac`: `manifest.json` and, per material, the gzip of headerless little-endian 16-bit
 //! records, one per slide.
 //!
-//! What is taken from the manifest: `slides` (their numbers, the same for all materials), `record` (name, count and rate of
-//! each field of a record, in its order; wanted are `pac`, `pdc` and `f_tangential`), `motion.speed_mm_s`,
-//! `steady_window_s`, and per file its name, material, sizes and hashes. Nothing is assumed about how many materials, slides
-//! or samples there are.
+//! Fields that are read from the manifest: `slides` (their numbers, the same for all materials), `record` (name, count
+//! and rate of each field of a record, in its order; `pac`, `pdc` and `f_tangential` are used), `motion.speed_mm_s`,
+//! `steady_window_s`, and per file its name, material, sizes and hashes. Nothing is assumed about the numbers of
+//! materials, slides or samples.
 use std::path::PathBuf;
 
 use serde::Deserialize;
@@ -20,14 +20,14 @@ use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
 
 /// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
 pub const NOMINAL_FORCE_MN: u16 = 800;
-/// Background power in counts^2: the records start with the finger in motion, and this is what the golden roughness
-/// subtracts.
+/// Background power in counts^2: the records start with the finger in motion, and the golden roughness subtracts this
+/// value.
 pub const BACKGROUND_POWER: f32 = 2.2;
 
 /// Most bytes of samples of one material: it is read into memory as a whole.
 const MAX_RAW: u64 = 1 << 30;
 
-/// What the manifest says, checked.
+/// The contents of a manifest, checked.
 #[derive(Debug)]
 pub struct Manifest {
     path: PathBuf,
@@ -39,7 +39,7 @@ pub struct Manifest {
     files: Vec<Entry>,
 }
 
-/// Where in a record the fields are.
+/// Places of the fields in a record.
 #[derive(Debug)]
 struct Record {
     values: usize,

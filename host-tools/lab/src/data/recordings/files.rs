@@ -1,4 +1,4 @@
-//! What all readers and writers of recordings share: their errors, bounded reads, and hashes.
+//! Common code of all readers and writers of recordings: their errors, bounded reads, and hashes.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
@@ -18,12 +18,12 @@ use crate::data::rows::RowError;
 pub const OWN_MANIFEST: &str = "manifest.csv";
 /// Name of the manifest of folders like `data/biotac`.
 pub const BIOTAC_MANIFEST: &str = "manifest.json";
-/// What a folder has in it while it is not whole.
+/// Name of the mark in a folder that is not whole.
 pub const INCOMPLETE: &str = "INCOMPLETE";
 /// Largest manifest that is read, in bytes.
 pub const MAX_MANIFEST: u64 = 64 << 20;
 
-/// Why recordings cannot be read or written. Every message names the file, the cause and what to do.
+/// Reasons why recordings cannot be read or written. Every message names the file, the cause and a remedy.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
 pub enum RecordingError {
@@ -35,20 +35,22 @@ pub enum RecordingError {
     NoFolder(PathBuf),
     /// The folder has no manifest.
     #[error(
-        "{}: neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the publisher's CSV files \
-         (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first", .0.display()
+        "{}: neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the publisher's CSV \
+         files (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first", .0.display()
     )]
     NoManifest(PathBuf),
     /// The folder has nothing that can be imported.
     #[error(
         "{}: nothing to import: neither a manifest, nor raw_data/mat1/mat1_1_bio.csv and the like of \
-         https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, ...", .0.display()
+         https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, \
+         ...", .0.display()
     )]
     NothingToImport(PathBuf),
     /// The folder does not have the Cluster dataset's layout.
     #[error(
-        "{}: no slide of the Cluster Haptic Texture Dataset here, such as sensor_data/accel/0/0_135_40_500_0.csv; give the folder \
-         that holds sensor_data. The CSV files of https://doi.org/10.6084/m9.figshare.29438288 are read, .parquet is not", .0.display()
+        "{}: no slide of the Cluster Haptic Texture Dataset here, such as sensor_data/accel/0/0_135_40_500_0.csv; give \
+         the folder that holds sensor_data. The CSV files of https://doi.org/10.6084/m9.figshare.29438288 are read, \
+         .parquet is not", .0.display()
     )]
     NoCluster(PathBuf),
     /// The system could not read or write.
@@ -56,7 +58,7 @@ pub enum RecordingError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         cause: io::Error,
     },
     /// A row of a table makes no sense.
@@ -69,19 +71,20 @@ pub enum RecordingError {
         path: PathBuf,
         /// Line, or the name of the field.
         place: String,
-        /// What is wrong with it, and what to do.
+        /// The fault, and its remedy.
         cause: ContentError,
     },
-    /// A file of samples is not what its manifest says.
+    /// A file of samples differs from its manifest.
     #[error("{}: {cause}", path.display())]
     Samples {
         /// The file of samples.
         path: PathBuf,
-        /// What is wrong with it, and what to do.
+        /// The fault, and its remedy.
         cause: ContentError,
     },
     /// A manifest names a file outside its folder.
-    #[error("{}: names the file {name:?}, which is not inside this folder; it is not opened. Correct the manifest", manifest.display())]
+    #[error("{}: names the file {name:?}, which is not inside this folder; it is not opened. Correct the \
+         manifest", manifest.display())]
     Outside {
         /// The manifest.
         manifest: PathBuf,
@@ -107,11 +110,12 @@ pub enum RecordingError {
         name: String,
     },
     /// Two slides have one number, so their order in time is unknown.
-    #[error("{}: {place}: slide {number} of texture {id} is listed twice; number the slides of a texture in the order of time", manifest.display())]
+    #[error("{}: {place}: slide {number} of texture {id} is listed twice; number the slides of a texture in the order \
+         of time", manifest.display())]
     DuplicateSlide {
         /// The manifest.
         manifest: PathBuf,
-        /// Where the second one is.
+        /// Place of the second one.
         place: String,
         /// Number of the texture.
         id: u32,
@@ -125,7 +129,7 @@ pub enum RecordingError {
         folder: PathBuf,
         /// The index that was asked for.
         index: usize,
-        /// How many textures there are.
+        /// Number of textures.
         count: usize,
     },
     /// Recordings that were begun and are not whole.
@@ -200,24 +204,24 @@ pub fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBuf> {
     Ok(folder.join(relative))
 }
 
-/// Where the files of a set are.
+/// The place of a set's files.
 #[derive(Debug)]
 pub enum Place {
     /// In a folder of this machine.
     Folder(PathBuf),
-    /// In memory, by their names in the folder that is called so.
+    /// In memory, by their names in the folder of this name.
     Memory(PathBuf, BTreeMap<String, Vec<u8>>),
 }
 
 impl Place {
-    /// What the folder is called.
+    /// Name of the folder.
     pub fn folder(&self) -> &Path {
         match self {
             Self::Folder(folder) | Self::Memory(folder, _) => folder,
         }
     }
 
-    /// Whether a file of this name is there.
+    /// Returns true if there is a file of this name.
     pub(super) fn has(&self, name: &str) -> bool {
         match self {
             Self::Folder(folder) => folder.join(name).is_file(),
@@ -243,7 +247,8 @@ impl Place {
     }
 }
 
-/// The bytes of a file of at most `limit` bytes. Memory grows with the bytes that come, not with what a manifest claims.
+/// The bytes of a file of at most `limit` bytes. Memory grows with the bytes that come, not with what a manifest
+/// claims.
 pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io_error = |source| RecordingError::Io {
         path: path.to_owned(),

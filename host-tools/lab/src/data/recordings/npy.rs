@@ -5,7 +5,7 @@ pub const MAX_SAMPLES: usize = 1 << 22;
 /// Longest file that [`read`] can be given: samples and a generous header.
 pub const MAX_BYTES: u64 = 2 * MAX_SAMPLES as u64 + 4096;
 
-/// Why a file is no stream of samples, and what to do.
+/// Reasons why a file is no stream of samples, and remedies.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum NpyError {
     /// Another format.
@@ -53,7 +53,8 @@ pub fn array(kind: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write()`] make them.
+/// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write()`] make
+/// them.
 ///
 /// The header is compared with the one form it can have. npyz would parse it as a Python literal of any depth and size,
 /// which a damaged file can turn against us.

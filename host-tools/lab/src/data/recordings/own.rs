@@ -12,16 +12,17 @@
 //! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; empty if there is a power |
 //! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
 //! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline |
-//! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force in mN, positive against the motion; file and hash are empty where it was not measured |
-//! | `lot`, `operator`, `note` | batch or piece of the sample, who made the slide, anything else; may be empty or missing |
-//! | `moved` | whether the sample was moved or turned since the slide before: `yes`, `no`, or empty where nobody said; may be missing |
+//! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force against the motion, mN; empty if not measured |
+//! | `lot`, `operator`, `note` | batch or piece, operator, remark; may be empty or missing |
+//! | `moved` | sample moved or turned since the slide before: `yes`, `no`, or empty or missing if unknown |
 //! | `finger` | the finger: `biotac`, `analog` or `mems`; empty or missing for a BioTac |
-//! | `calibrated` | day on which that finger's force per count was measured, as 20261121; 1 where nobody knew the day; empty, 0 or missing if it was not, or is not known |
-//! | `pace` | natural logarithm of the slide's mean speed in parts of `speed_mm_s`, in steps of 1/1024, by a sensor of motion; empty or missing where it was not measured |
+//! | `calibrated` | day of the force calibration, as 20261121; 1: day unknown; empty, 0 or missing: none, or unknown |
+//! | `pace` | ln(mean speed / `speed_mm_s`) in 1/1024, by a sensor of motion; empty or missing if not measured |
+//! | `version` | version of this format, 1; empty or missing for 1 |
 //!
-//! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is a
-//! one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows may come
-//! in any order; textures are taken in the order of their first row.
+//! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is
+//! a one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows
+//! may come in any order; textures are taken in the order of their first row.
 use std::io::Cursor;
 
 use tactus_core::features::Movement;
@@ -59,8 +60,11 @@ pub const COLUMNS: [&str; 19] = [
     "shear_sha256",
 ];
 
-/// Columns that follow them, which older manifests do not have.
-pub const LABELS: [&str; 7] = [
+/// Version of the format.
+pub const VERSION: u32 = 1;
+
+/// Columns that follow them, and may be missing: not everybody measures, or notes, what they hold.
+pub const LABELS: [&str; 8] = [
     "lot",
     "operator",
     "note",
@@ -68,9 +72,10 @@ pub const LABELS: [&str; 7] = [
     "finger",
     "calibrated",
     "pace",
+    "version",
 ];
 
-/// What the manifest says, checked.
+/// The contents of a manifest, checked.
 #[derive(Debug)]
 pub struct Manifest {
     textures: Vec<(Texture, Vec<Entry>)>,
@@ -178,6 +183,13 @@ impl Manifest {
 
 impl Entry {
     fn of(row: &Row<'_>) -> std::result::Result<Self, RowError> {
+        if !row.text("version").is_empty() {
+            let version = row.parse("version", "the number of a version")?;
+            if version != VERSION {
+                let cause = ContentError::Version(version);
+                return Err(row.error(Some("version"), cause));
+            }
+        }
         let rate = |column| row.parse(column, "a rate in whole Hz");
         let movement = Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
             .map_err(|e| row.error(None, e.into()))?;
@@ -198,7 +210,7 @@ impl Entry {
             Stream::of(row, file, sha256)?
                 .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
         };
-        let [lot, operator, note, moved, finger, calibrated, pace] =
+        let [lot, operator, note, moved, finger, calibrated, pace, _] =
             LABELS.map(|column| row.text(column).to_owned());
         let moved = match moved.as_str() {
             "" => None,

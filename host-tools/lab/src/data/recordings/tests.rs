@@ -248,6 +248,15 @@ fn own_manifest_errors_name_line_and_column() {
             ["\"/etc/passwd\"", "not inside this folder"],
         ),
         ("t007_s001_pdc.npy", "x.npy", ["x.npy: ", "No such file"]),
+        (
+            "biotac,,,1",
+            "biotac,,,2",
+            [
+                "manifest.csv:2: column version",
+                "version 2, and this program reads version 1: write the recordings anew, or use the program \
+                 that wrote them",
+            ],
+        ),
     ] {
         let (folder, _) = own();
         edit(&folder.path().join(OWN_MANIFEST), from, to);
@@ -370,7 +379,7 @@ fn the_writer_refuses_what_the_reader_would() {
     let other = message(other.unwrap_err());
     assert!(other.contains("not whole, by: test"), "{other}");
 
-    // and the same one goes on, once
+    // and the same one continues, once
     let mut writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
     assert!(writer.has(0, 1) && !writer.has(1, 1));
     writer.write(&slide(1, 1)).unwrap();
@@ -475,7 +484,7 @@ fn npyz_reads_what_is_written_and_writes_what_is_read() {
 }
 
 #[test]
-fn labels_come_back_and_older_manifests_have_none() {
+fn labels_come_back_and_may_be_missing() {
     let folder = tempfile::tempdir().unwrap();
     let given = Labels {
         lot: "7, front".to_owned(),
@@ -514,7 +523,7 @@ fn labels_come_back_and_older_manifests_have_none() {
     };
     let paces = [0, 1].map(|texture| pace(folder.path(), texture));
     assert_eq!(paces, [Some(-341), None]);
-    // what is neither yes nor no is none
+    // a value that is neither yes nor no is unknown
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace(",,no,", ",,maybe,")).unwrap();
@@ -531,19 +540,22 @@ fn labels_come_back_and_older_manifests_have_none() {
     let copied = RecordingSet::open(&to).unwrap();
     assert_eq!(copied.slides(0)[0].labels, labels(0));
     assert_eq!(pace(&to, 0), Some(-341));
-    // as they were written before there were labels
+    // written by hand, without labels
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
-    let older = text.replace(",lot,operator,note,moved,finger,calibrated,pace", "");
-    let older = older.replace(
-        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121,-341",
+    let bare = text.replace(
+        ",lot,operator,note,moved,finger,calibrated,pace,version",
         "",
     );
-    let older: String = older
+    let bare = bare.replace(
+        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121,-341,1",
+        "",
+    );
+    let bare: String = bare
         .lines()
-        .map(|line| format!("{}\n", line.strip_suffix(",,,,,biotac,,").unwrap_or(line)))
+        .map(|line| format!("{}\n", line.strip_suffix(",,,,,biotac,,,1").unwrap_or(line)))
         .collect();
-    fs::write(&manifest, older).unwrap();
+    fs::write(&manifest, bare).unwrap();
     assert_eq!(
         [labels(0), labels(1)],
         [Labels::default(), Labels::default()]

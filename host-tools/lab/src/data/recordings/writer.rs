@@ -1,8 +1,8 @@
-//! Writing recordings in the project's own format, so that what is interrupted can go on.
+//! Writing of recordings in the project's own format, so that an interrupted one can continue.
 //!
-//! Files of samples come first, then the slide's row, in `manifest.csv.part`, which becomes the manifest when all is there.
-//! Beside it lies [`INCOMPLETE`], which says what is being recorded: the same command goes on where the last one ended,
-//! however it ended, and no other one writes into the folder.
+//! Files of samples come first, then the slide's row, in `manifest.csv.part`, which becomes the manifest when all is
+//! there. Beside it lies [`INCOMPLETE`], which names the recording in progress: the same command continues after any
+//! interruption, and no other one writes into the folder.
 
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions};
@@ -14,11 +14,11 @@ use super::files::{
     distinct_textures, inside, read_bounded, sha256,
 };
 use super::npy;
-use super::own::{COLUMNS, LABELS};
+use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 
-/// What becomes the manifest.
+/// Name of the file that becomes the manifest.
 const ROWS: &str = "manifest.csv.part";
 /// Columns of [`COLUMNS`]: texture, name, slide; and of files, each followed by or before its hash.
 const KEY: [usize; 3] = [0, 1, 2];
@@ -40,11 +40,11 @@ pub struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Starts the recordings of `textures` in `folder`, which is made if it is not there, or goes on with what the same
-    /// `command` has left unfinished there: [`has`](Self::has) tells which slides are there.
+    /// Starts the recordings of `textures` in `folder`, which is made if it is not there, or continues the unfinished
+    /// ones of the same `command`: [`has`](Self::has) returns the slides that are there.
     ///
     /// # Errors
-    /// If the folder cannot be made, or holds recordings, or what another command has left unfinished, or other files; or two
+    /// If the folder cannot be made, or holds recordings, or unfinished ones of another command, or other files; or two
     /// textures have one number.
     pub fn begin(folder: &Path, textures: Vec<Texture>, command: &str) -> Result<Self> {
         let note = note(command);
@@ -105,17 +105,17 @@ impl RecordingWriter {
         Ok(())
     }
 
-    /// How many slides of a texture are there.
+    /// Number of slides of a texture that are there.
     pub fn slides(&self, texture: usize) -> usize {
         self.keys.iter().filter(|(t, _)| *t == texture).count()
     }
 
-    /// Whether this slide of a texture is there.
+    /// Returns true if this slide of a texture is there.
     pub fn has(&self, texture: usize, number: u32) -> bool {
         self.keys.contains(&(texture, number))
     }
 
-    /// Leaves out what was written of a texture.
+    /// Leaves out the slides of a texture.
     ///
     /// # Errors
     /// If the rows cannot be written again.
@@ -128,7 +128,7 @@ impl RecordingWriter {
         Ok(())
     }
 
-    /// Of the slides from here on: whether the sample was moved or turned before.
+    /// Notes for the slides from here on whether the sample was moved or turned before.
     pub fn moved(&mut self, moved: Option<bool>) {
         self.labels.moved = moved;
     }
@@ -197,7 +197,7 @@ impl RecordingWriter {
 }
 
 impl Drop for RecordingWriter {
-    /// What came to nothing leaves nothing; a part of a slide stays, for the same command to go on.
+    /// Removes an empty folder; a part of a slide stays, so that the same command can continue.
     fn drop(&mut self) {
         let is_ours = |entry: std::io::Result<fs::DirEntry>| {
             entry.is_ok_and(|entry| {
@@ -268,10 +268,12 @@ fn row(
     row.push(day.unwrap_or_default());
     let pace = slide.pace.map(|pace| pace.to_string());
     row.push(pace.unwrap_or_default());
+    row.push(VERSION.to_string());
     Ok(row)
 }
 
-/// The files of a folder of recordings of one texture, by their names, for those who have no file system; each slide has labels.
+/// The files of a folder of recordings of one texture, by their names, for those who have no file system; each slide
+/// has labels.
 ///
 /// # Errors
 /// A slide makes no sense.
@@ -294,10 +296,10 @@ pub fn files(texture: &Texture, slides: &[(Recording, Labels)]) -> Result<Vec<(S
     Ok(files)
 }
 
-/// What the folder says while it is not whole.
+/// Text of the mark in a folder that is not whole.
 fn note(command: &str) -> String {
     format!(
-        "{command}\nThe same command goes on here where it stopped; to begin anew, remove this folder.\n({})\n",
+        "{command}\nThe same command continues these recordings; to begin anew, remove this folder.\n({})\n",
         program()
     )
 }
@@ -310,7 +312,7 @@ fn read_note(folder: &Path) -> Result<Option<String>> {
     }
 }
 
-/// Whether nobody's files are in it.
+/// Returns true if it holds no files of others.
 fn is_empty(folder: &Path) -> Result<bool> {
     let mut names = fs::read_dir(folder).map_err(|e| io_error(folder, e))?;
     // a command that ended when it had only begun leaves a part of its note
@@ -344,7 +346,7 @@ fn read_rows(folder: &Path) -> Result<String> {
 /// The rows of a command that ended, up to the first that is not whole, or whose files are not.
 fn rows_there(folder: &Path, textures: &[Texture]) -> Result<Vec<Vec<String>>> {
     let text = read_rows(folder)?;
-    // of a row that was cut short, nothing is believed
+    // a row that was cut short is not believed
     let (whole, _) = text.rsplit_once('\n').unwrap_or_default();
     let mut reader = csv::Reader::from_reader(whole.as_bytes());
     if reader.headers().is_ok_and(|there| *there != header()) {
@@ -365,7 +367,7 @@ fn rows_there(folder: &Path, textures: &[Texture]) -> Result<Vec<Vec<String>>> {
         .collect())
 }
 
-/// Whether a file that a row names is the one that was written; a stream that was not measured has none.
+/// Returns true if a file that a row names is unchanged; a stream that was not measured has none.
 fn is_there(folder: &Path, file: &str, hash: &str) -> bool {
     file.is_empty()
         || inside(folder, ROWS, file)

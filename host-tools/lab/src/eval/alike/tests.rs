@@ -19,7 +19,7 @@ fn normal(random: &mut ChaCha8Rng) -> f64 {
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// What two textures are like: at each movement a mean in standard deviations, `apart[movement]` from each other.
+/// A pair of textures: at each movement a mean in standard deviations, `apart[movement]` from each other.
 struct Pair {
     means: [[Vec<f64>; MOVEMENTS.len()]; 2],
 }
@@ -111,7 +111,7 @@ fn properties(slide: &[f64]) -> Properties {
     Properties::new([value(0), value(1), value(2)])
 }
 
-/// Whether the explorer takes a slide of the first for the second.
+/// Returns true if the explorer takes a slide of the first for the second.
 fn is_taken(table: Table<'_>, movement: u8, slide: &Observation) -> bool {
     let config = Config {
         method: Method::of(table.contents()),
@@ -128,8 +128,8 @@ fn is_taken(table: Table<'_>, movement: u8, slide: &Observation) -> bool {
 
 type Learn = fn(&Pair, [u8; 2], &mut ChaCha8Rng) -> (Vec<u8>, usize);
 
-/// Mean of what is said, and share of slides that the explorer really takes for the other's, over many tables of pairs so far
-/// apart, at the movement that is said to be the best.
+/// Mean of the computed share, and the share of slides that the explorer takes for the other's, over many tables of
+/// pairs so far apart, at the movement that is computed to be the best.
 fn said_and_seen(learn: Learn, features: usize, apart: [f64; 3], trials: [u8; 2]) -> (f64, f64) {
     const TABLES: u64 = 200;
     const SLIDES: u32 = 20;
@@ -173,7 +173,7 @@ fn as_many_slides_are_taken_for_the_others_as_is_said() {
                     "{features} features, {trials:?} trials, {apart:?} apart: said {said:.3}, seen {seen:.3}"
                 );
                 if apart == [0.0; 3] {
-                    // one texture: chance alone tells them apart, and ten slides do not
+                    // one texture: only chance separates them, and ten slides do not
                     assert!(said > 0.25 && seen > 0.25, "{which}");
                 } else {
                     assert!((said - seen).abs() < 0.1, "{which}");

@@ -1,16 +1,17 @@
-//! Why slides do not make an experiment.
+//! Reasons why slides do not make an experiment.
 
 use tactus_core::features::Movement;
 use tactus_core::table;
 
 use crate::eval::show::count;
 
-/// Why an experiment cannot be made.
+/// Reasons why an experiment cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
     /// Too few slides.
     #[error(
-        "{texture}, {movement}: {} to train from, and --train-slides is {wanted}; ask for fewer", count(*there as u64, "slide")
+        "{texture}, {movement}: {} to train from, and --train-slides is {wanted}; ask for \
+         fewer", count(*there as u64, "slide")
     )]
     Training {
         /// Name of the texture.
@@ -34,7 +35,7 @@ pub enum ExperimentError {
     },
     /// As [`Self::Training`], where all of them are to be used.
     #[error(
-        "{texture}, {movement}: {there} training slide; how slides of one texture differ takes at least two"
+        "{texture}, {movement}: {there} training slide; the spread of a texture's slides takes at least two"
     )]
     Few {
         /// Name of the texture.
@@ -45,7 +46,7 @@ pub enum ExperimentError {
         there: usize,
     },
     /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: how slides of one texture differ takes at least two slides")]
+    #[error("--train-slides {0}: the spread of a texture's slides takes at least two slides")]
     One(usize),
     /// The folder of test slides lacks something.
     #[error(

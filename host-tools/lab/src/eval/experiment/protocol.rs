@@ -1,6 +1,6 @@
 //! Which slides are for training, and which for testing.
 
-/// How slides are divided into training and test.
+/// Division of slides into training and test.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 #[cfg_attr(feature = "arguments", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]

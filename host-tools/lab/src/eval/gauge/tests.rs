@@ -131,7 +131,7 @@ fn a_slide_that_went_wrong_is_outside() {
     let mut readings = drawn([0.1, 0.1, 0.0, 1.0], 8, 3, 1);
     assert!(study(&readings).unwrap().outside.is_empty());
     let limit = study(&readings).unwrap().control_limit;
-    // the third of four: of two, nobody can say which of them it was
+    // the third of four: of two, the outlier is undecidable
     let of = |n: usize| (readings[n].part.clone(), readings[n].operator.clone());
     let third = (1..readings.len() - 2).find(|&n| of(n - 1) == of(n + 2));
     let third = third.unwrap() + 1;

@@ -11,7 +11,8 @@ fn recorded() -> (Vec<String>, Vec<Vec<MeasuredSlide>>) {
     (names, measure_all(&set, |_| ()).unwrap())
 }
 
-/// The table of these textures, learned from their first two slides of every movement, and the slides that are left of all.
+/// The table of these textures, learned from their first two slides of every movement, and the slides that are left of
+/// all.
 fn table_of(wanted: &[&str], twin: bool) -> (Vec<u8>, Vec<Slides>) {
     let (names, measured) = recorded();
     let mut movements = Vec::new();
@@ -107,7 +108,7 @@ fn recorded_slides_say_what_users_would_be_told() {
         .iter()
         .map(|t| t.recorded.unwrap().verdicts.right);
     assert!((rights.sum::<f64>() / 5.0 - recorded.known.right).abs() < 1e-9);
-    // the slides of one texture in place of another's: nobody would be right, and it is said to have changed
+    // the slides of one texture in place of another's: no verdict would be right, and the report calls it changed
     let mut swapped = left.clone();
     swapped[0].slides.clone_from(&left[4].slides);
     let swapped = Report::new(table, Some(&swapped), 1, || ()).unwrap();

@@ -1,4 +1,4 @@
-//! How well the fault that a rig names fits what broke: by what was injected, never by what the firmware believes.
+//! Fit of the fault that a rig names to the injected ones: by the injection, never by the firmware's state.
 
 use std::fmt;
 
@@ -6,15 +6,15 @@ use tactus_core::rig::Fault as Named;
 
 use tactus_world::faults::Fault;
 
-/// How well what was named fits what broke.
+/// Fit of the named faults to the injected ones.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Naming {
-    /// No fault was named, and what was asked for was done.
+    /// No fault was named, and the request was done.
     Unnoticed,
-    /// No fault was named, and what was asked for was refused with a reason of its own: slides that were rejected, constants that
-    /// are not to be believed.
+    /// No fault was named, and the request was refused with a reason of its own: slides that were rejected, constants
+    /// that are implausible.
     Refused,
-    /// Each name is one that fits something that broke.
+    /// Each named fault fits an injected one.
     Right,
     /// The rig stopped, with a name that leads somewhere else.
     Other,
@@ -31,7 +31,7 @@ impl fmt::Display for Naming {
     }
 }
 
-/// How well these names fit what broke; `refused` is whether what was asked for was not done.
+/// Fit of these names to the injected faults; `refused` is true if the request was not done.
 pub fn judge<'f>(
     broke: impl Iterator<Item = &'f Fault> + Clone,
     named: &[Named],
@@ -46,8 +46,8 @@ pub fn judge<'f>(
     }
 }
 
-/// The names that fit a fault: what they say of the rig is so, and their remedy leads to what broke. None where the rig has no
-/// name for it.
+/// The names that fit a fault: their description of the rig is true, and their remedy leads to the cause. Empty if the
+/// rig has no name for it.
 pub fn right(fault: Fault) -> &'static [Named] {
     match fault {
         Fault::SensorUnplugged | Fault::MisoStuck { .. } => &[Named::SensorSilent],

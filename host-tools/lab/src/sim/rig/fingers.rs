@@ -1,4 +1,4 @@
-//! The fingers of parts on the simulated rig and in a simulated hand: explorations, and what becomes of each fault.
+//! The fingers of parts on the simulated rig and in a simulated hand: explorations, and the result of each fault.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use crate::sim::handheld;
 use crate::sim::rig::{Performed, SimError, SimRig};
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::dsp::{Plain, Plan};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, PropertySet};
 use tactus_core::handheld::{ASK_AFTER, judge_at_most};
@@ -31,7 +31,8 @@ fn world(seed: u64) -> Collection {
     }
 }
 
-/// Explores each texture of a table, once for each of these trials: how many were right, and how every slide was really made.
+/// Explores each texture of a table, once for each of these trials: how many were right, and how every slide was really
+/// made.
 fn explore_on_the_rig(
     finger: FingerName,
     world: &Collection,
@@ -137,7 +138,7 @@ fn explore_by_hand(finger: FingerName, world: &Collection, trials: Range<u64>) -
             let (measured, _) = handheld::slides(setup, Manner::default(), 5).unwrap();
             let judged = (1..=ASK_AFTER)
                 .map(|n| {
-                    judge_at_most::<Plain>(table, &measured[..n], None, None, ASK_AFTER)
+                    judge_at_most(table, &measured[..n], None, None, ASK_AFTER)
                         .unwrap()
                         .0
                 })
@@ -154,9 +155,10 @@ fn explore_by_hand(finger: FingerName, world: &Collection, trials: Range<u64>) -
     [right, all]
 }
 
-/// From five slides of each texture, and from as many as the factory's tables have. What shakes the handle reaches the transducers of
-/// the fingers of parts, and no fluid's resonance shapes what they feel: textures are less far apart, and with few slides the
-/// means of those that are most alike are not where they should be: 60, 55 and 51 of these 60, and 60, 60 and 56. The book says so.
+/// From five slides of each texture, and from as many as the factory's tables have. Vibrations of the handle reach the
+/// transducers of the fingers of parts, and no fluid's resonance shapes their signal: textures are less far apart, and
+/// with few slides the means of those that are most alike are not where they should be: 60, 55 and 51 of these 60, and
+/// 60, 60 and 56. The book says so.
 #[test]
 fn three_explorations_of_each_texture_by_hand() {
     for (trials, least_percent) in [(5, [95, 80, 80]), (15, [95, 95, 90])] {
@@ -174,17 +176,8 @@ fn three_explorations_of_each_texture_by_hand() {
     }
 }
 
-#[test]
-#[ignore = "fifty seeds of each finger, rig and hand; minutes"]
-fn fifty_seeds() {
-    for finger in FingerName::ALL {
-        explore_by_hand(finger, &world(11), 100..150);
-        explore_on_the_rig(finger, &world(11), 100..150);
-    }
-}
-
-/// What the rig said, and the most that the finger felt by the world, N, when this broke: before anything moved, or 300 ms
-/// into a phase of a slide.
+/// The rig's fault, and the largest force on the finger by the world, N, when this broke: before anything moved, or
+/// 300 ms into a phase of a slide.
 fn broken(finger: FingerName, fault: PartFault, seed: u64, at: Phase) -> (Option<Fault>, f64) {
     let mut rig = SimRig::new(Setup {
         texture: [1, 45, 60, 95][seed as usize % 4],
@@ -228,7 +221,7 @@ fn broken(finger: FingerName, fault: PartFault, seed: u64, at: Phase) -> (Option
     (named, rig.world().truth().force_max_n)
 }
 
-/// Names of the faults that a part's fault may be called; nothing, where it must make no difference.
+/// Names that are right for a part's fault; none, where it must make no difference.
 fn names(finger: FingerName, fault: PartFault) -> &'static [Fault] {
     use Fault::*;
     use PartFault::*;
@@ -236,7 +229,7 @@ fn names(finger: FingerName, fault: PartFault) -> &'static [Fault] {
         (FingerName::Analog, AccelerometerBrownOut | CellBrownOut | ClocksOff { .. }) => &[],
         (FingerName::Mems, ClocksOff { .. }) => &[],
         (_, CellReversed) => &[Unsteady, LeverSlips, ForceHigh],
-        // a cell of which nothing else tells: the lever goes down as far as the sprung mount lets it
+        // a cell without any other witness: the lever goes down as far as the sprung mount lets it
         (FingerName::Mems, CellBlocked) => &[NoContact, LeverSlips, Unsteady],
         (_, CellBlocked) => &[PressureDead, LeverSlips, Unsteady],
         // between two transactions of a slot: a force for a moment
@@ -281,7 +274,7 @@ fn each_fault_of_a_part_is_named_and_never_presses_too_hard() {
                 println!("{finger}, {fault:?}, {at:?}: {named:?}, at most {most_n:.3} N");
                 let allowed = names(finger, fault);
                 let right = |named: Option<Fault>| match named {
-                    // once the lever holds, a cell that stands still is not asked any more
+                    // once the lever holds, a cell that stands still is not checked any more
                     None => {
                         let started_after = matches!(fault, AccelerometerBrownOut | CellBrownOut)
                             && at == Phase::Parked;

@@ -1,4 +1,4 @@
-//! What differs from rig to rig, measured: serial number, motor current, forces.
+//! Properties that differ from rig to rig, measured: serial number, motor current, forces.
 
 use std::convert::Infallible;
 
@@ -27,7 +27,7 @@ impl SimRig {
         Ok(calibration)
     }
 
-    /// Where the stage stood before a run over the sample and after it, and its mean motor current.
+    /// Place of the stage before a run over the sample and after it, and its mean motor current.
     fn run_unloaded(&mut self, speed_um_s: u32) -> Result<(f32, f32, Option<f32>), SimError> {
         let from = self.control.stage_mm();
         self.control.start_unloaded(speed_um_s)?;
@@ -91,7 +91,7 @@ impl SimRig {
         }
         self.world.incline(0.0);
         let (_, ampere_per_newton) = incline.line()?;
-        // the plate is what lies under the finger, and reads what really presses on it
+        // the plate lies under the finger, and reads the true force
         let mut plate = LineFit::default();
         for force_mn in [300, 600, 900, 1200] {
             let Ok(movement) = Movement::new(force_mn, 10_000) else {

@@ -1,4 +1,5 @@
-//! A kitchen scale's weights on the lifted finger of a rig, as [`ServoRig`] asks for them: its guard is on, whatever lies on it.
+//! A kitchen scale's weights on the lifted finger of a rig, as [`ServoRig`] asks for them: its guard is on with any
+//! weight on it.
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
@@ -20,15 +21,15 @@ use tactus_world::person::{Hand, Manner};
 use tactus_world::slot::Reader;
 use tactus_world::world::Setup;
 
-/// The finger must never feel more, N.
+/// Largest force that the finger ever bears, N.
 const MOST_N: f64 = 2.2;
 /// Seeds of each finger.
 const SEEDS: u64 = 5;
 
-/// A person at a rig who does what it asks for, without a tremor: what lies on the finger is a weight.
+/// A person at a rig who follows its prompts, without a tremor: a weight lies on the finger.
 struct Weights {
     rig: SimRig,
-    /// What a weight is in truth, of what it says.
+    /// True weight, relative to the one that is written on it.
     share: f64,
     state: RigState,
 }
@@ -156,7 +157,7 @@ fn weights_on_the_lifted_finger_give_its_force_per_count() {
         let model = Reader::new(finger).model().calibration;
         let share = weighed.mn_per_count / model.force_mn_per_count;
         assert!((share - 1.0).abs() < 0.03, "{finger}, {seed}: {weighed:?}");
-        // nobody is asked for a weight any more: what presses now is a fault
+        // the request for a weight is over: a press now is a fault
         let servo = &mut rig.servo;
         assert_eq!(servo.lay(0.3), Phase::Ready, "{finger}, {seed}");
         let phase = servo.lay(0.6);
@@ -173,7 +174,7 @@ fn a_load_cell_that_is_wired_the_wrong_way_round_falls() {
     }
 }
 
-/// A weight of 150 g is asked for, and 230 g lie there.
+/// The rig asks for a weight of 150 g, and 230 g lie there.
 #[test]
 fn too_heavy_a_weight_stops() {
     each(1, |finger, seed| {
@@ -208,7 +209,8 @@ fn a_lever_that_comes_down_in_place_of_a_weight_is_seen() {
     });
 }
 
-/// A person who points the finger down and turns it over, as asked. What comes of it, and a g and the zero in truth, in counts.
+/// A person who points the finger down and turns it over, as asked. Returns the result, and the true values of a g and
+/// of the zero, in counts.
 fn turned(seed: u64, lean_rad: f64) -> (Result<Turned, Failure>, [f64; 2]) {
     let mut draws = Noise::new(seed, 77);
     let (share, zero_g) = (draws.between(-0.03, 0.03), draws.between(-0.06, 0.06));
@@ -239,7 +241,7 @@ fn an_accelerometer_that_is_turned_over_says_what_a_count_is() {
     });
 }
 
-/// In a hand that leans by 11 degrees rms a g looks smaller, and what is too far askew is refused.
+/// In a hand that leans by 11 degrees rms a g looks smaller, and a turn that is too far askew is refused.
 #[test]
 fn a_hand_that_leans_measures_a_little_less() {
     let each = (1..=50u64).into_par_iter().map(|seed| {

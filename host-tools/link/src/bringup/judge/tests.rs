@@ -274,6 +274,7 @@ fn slid(change: impl Fn(&mut SlideSeen)) -> Finding {
             background: 4.0,
             bands: Default::default(),
             pressure: None,
+            pace: None,
         }),
         ..SlideSeen::default()
     };

@@ -1,4 +1,4 @@
-//! Every way in which a folder of fabrics can be wrong, with the message it must give; and damage nobody thought of.
+//! Every fault of a folder of fabrics, with its message; and random damage.
 use proptest::prelude::*;
 
 use super::*;
@@ -175,7 +175,8 @@ fn slides_that_cannot_be_measured_are_named() {
     fails(
         folder(&[short]).path(),
         &[
-            "A.u16le.gz: set-point 120 at 10 mm/s, direction -1, rep 1: a slide of 31 samples is too short, 32 are the least",
+            "A.u16le.gz: set-point 120 at 10 mm/s, direction -1, rep 1: a slide of 31 samples is too short, 32 are the \
+             least",
         ],
     );
 
@@ -251,7 +252,9 @@ proptest! {
 
     /// A manifest with a few bytes changed: nearer to what happens than noise.
     #[test]
-    fn damaged_manifests_never_panic(changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+    fn damaged_manifests_never_panic(
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
         let folder = small();
         let path = folder.path().join(MANIFEST);
         let mut bytes = fs::read(&path).unwrap();

@@ -297,7 +297,6 @@ impl Monitor {
             | Event::Weighed { .. }
             | Event::Turned { .. }
             | Event::Verified { .. }
-            | Event::Pace(_)
             | Event::Early(_)
             | Event::Arm(_)
             | Event::Done(_)

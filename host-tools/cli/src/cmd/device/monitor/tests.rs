@@ -91,6 +91,7 @@ fn exploration() -> Vec<Event> {
                 background: 1.0,
                 bands: Default::default(),
                 pressure: None,
+                pace: None,
             },
             posterior: [0.05, 0.75, 0.15, 0.05].into_iter().collect(),
         },

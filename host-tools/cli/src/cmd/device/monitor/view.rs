@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{
     Axis, Block, BorderType, Chart, Clear, Dataset, GraphType, Paragraph, Sparkline,
 };
-use tactus_core::dsp::{BIN_HZ, Plain, SpectrumSum, angles};
+use tactus_core::dsp::{BIN_HZ, Plan, SpectrumSum};
 use tactus_core::features::Property;
 use tactus_core::wire::Phase;
 use tactus_lab::eval::show::count;
@@ -204,7 +204,7 @@ fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let [bars, axis] = Layout::vertical([Constraint::Min(1), Constraint::Length(1)]).areas(inner);
     let pac: Vec<i16> = monitor.pac.iter().copied().collect();
     let mut sum = SpectrumSum::default();
-    sum.push::<Plain>(&angles(), &pac);
+    sum.push(&Plan::new(), &pac);
     let (low, high) = SPECTRUM_HZ;
     // columns are equal ratios of frequency
     let hz = |column: u16| low * (high / low).powf(f32::from(column) / f32::from(inner.width));

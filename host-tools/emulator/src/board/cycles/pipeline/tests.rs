@@ -54,8 +54,8 @@ impl Run {
     }
 }
 
-/// Lines of four instructions of 32 bits: 5 waits for the first one; without prefetch as many for each other, with it the two cycles
-/// that a line's read of 6 is longer than its four instructions. Without wait states, none.
+/// Lines of four instructions of 32 bits: 5 waits for the first one; without prefetch as many for each other, with it
+/// the two cycles that a line's read of 6 is longer than its four instructions. Without wait states, none.
 #[test]
 fn straight_code_of_32_bits() {
     for (acr, expected) in [(0, 16), (5, 4 * (5 + 4)), (BOARD, 5 + 4 + 3 * (2 + 4))] {
@@ -71,8 +71,9 @@ fn straight_code_of_16_bits() {
     }
 }
 
-/// Two lines, 16 instructions, the last one branches back: 1 + P with a P of 1 as the target is known early. In the first turn
-/// 5 + 8 + 0 + 8 + 1. From then on line 0 is in the cache; line 1 is prefetched in time, or, without prefetch, is there, too.
+/// Two lines, 16 instructions, the last one branches back: 1 + P with a P of 1 as the target is known early. In the
+/// first turn 5 + 8 + 0 + 8 + 1. From then on line 0 is in the cache; line 1 is prefetched in time, or, without
+/// prefetch, is there, too.
 #[test]
 fn a_loop_that_fits_in_the_cache() {
     for (acr, first, others) in [
@@ -103,8 +104,9 @@ fn a_delay_takes_three_cycles_a_turn() {
     assert_eq!(run.one([0x3801, 0]) + run.one(BNE), 2, "not taken");
 }
 
-/// BX to a line that is nowhere: 1 + P = 3. Line 0 arrived in cycle 5 and line 1 is prefetched from 6 to 11, BX is issued in
-/// cycle 5 and done in 8, line 64 is read from 12 to 17: 9 waits. When it is back there later it finds it in the cache.
+/// BX to a line that is nowhere: 1 + P = 3. Line 0 arrived in cycle 5 and line 1 is prefetched from 6 to 11, BX is
+/// issued in cycle 5 and done in 8, line 64 is read from 12 to 17: 9 waits. When it is back there later it finds it in
+/// the cache.
 #[test]
 fn a_branch_to_a_cold_line() {
     let mut run = Run::new(BOARD);
@@ -180,9 +182,9 @@ const TIM2: u32 = 0x4000_0010;
 const SPI1: u32 = 0x4001_300c;
 const PORT: u32 = 0x4002_0c18;
 
-/// "STR Rx, [Ry, #imm] is always one cycle": the data go out while the next instruction is executed, which waits only if the buffer is
-/// full (100166 3.3.2). A store to APB1 is issued in cycle 0, has its data phase in 1 and 12 waits, so that the next access goes
-/// out in cycle 13.
+/// "STR Rx, [Ry, #imm] is always one cycle": the data go out while the next instruction is executed, which waits only
+/// if the buffer is full (100166 3.3.2). A store to APB1 is issued in cycle 0, has its data phase in 1 and 12 waits, so
+/// that the next access goes out in cycle 13.
 #[test]
 fn a_store_waits_in_the_write_buffer() {
     let cycles = |codes: &[([u16; 2], Option<u32>)]| {
@@ -193,12 +195,12 @@ fn a_store_waits_in_the_write_buffer() {
             .collect();
         each
     };
-    // what does not touch the bus goes on
+    // instructions that do not use the bus continue
     assert_eq!(
         cycles(&[(STR, Some(TIM2)), (ADDS, None), (ADDS, None)]),
         [1; 3]
     );
-    // the next access, to whatever memory, does not: 2 + 12, or 1 + 12
+    // the next access, to any memory, does not: 2 + 12, or 1 + 12
     for next in [RAM, TIM2, PORT] {
         let waits = if next == RAM {
             0
@@ -231,8 +233,8 @@ fn a_store_waits_in_the_write_buffer() {
     assert_eq!(cycles(&[(STR, Some(TIM2)), (DSB, None)]), [1, 12 + 4]);
 }
 
-/// A flag of TIM2 is cleared and its count read: LDR 2 + 12, STR 1, LDR 12 for the store and 2 + 12. In the model without the buffer the
-/// store took 13, and so in all the same: what it saves is what other instructions do meanwhile.
+/// A flag of TIM2 is cleared and its count read: LDR 2 + 12, STR 1, LDR 12 for the store and 2 + 12. In the model
+/// without the buffer the store took 13, and so in all the same: the gain is the work of other instructions meanwhile.
 #[test]
 fn a_register_read_behind_a_store_waits_for_both() {
     let mut run = Run::new(0);
@@ -240,7 +242,8 @@ fn a_register_read_behind_a_store_waits_for_both() {
     assert_eq!(codes, [14, 1, 12 + 14]);
 }
 
-/// Registers go to the stack and come back by the bus of the store: 12 and 12, 6 and 10. Behind another exception nothing does.
+/// Registers go to the stack and come back by the bus of the store: 12 and 12, 6 and 10. Behind another exception
+/// nothing does.
 #[test]
 fn an_exception_waits_for_the_write_buffer() {
     let vector = 0x0800_00b0;
@@ -254,7 +257,8 @@ fn an_exception_waits_for_the_write_buffer() {
     assert_eq!(run.core.leave(true) + run.core.enter(vector, true), 6);
 }
 
-/// LDR r0, [r1]; LDR r2, [r3]; STR r2, [r4]: 2 + 1 + 1. LDR r0, [r1]; LDR r2, [r0]: the second address is not there yet.
+/// LDR r0, [r1]; LDR r2, [r3]; STR r2, [r4]: 2 + 1 + 1. LDR r0, [r1]; LDR r2, [r0]: the second address is not there
+/// yet.
 #[test]
 fn loads_one_behind_the_other() {
     let load = |to: u16, from: u16| [0x6800 | from << 3 | to, 0];
@@ -274,7 +278,8 @@ fn results_of_the_fpu_come_a_cycle_later() {
     assert_eq!(codes.map(|code| run.one(code)), [1, 2, 1]);
 }
 
-/// An interrupt between two instructions: 12 into it, 10 back; a second one right behind it 6 more, and no return between.
+/// An interrupt between two instructions: 12 into it, 10 back; a second one right behind it 6 more, and no return
+/// between.
 #[test]
 fn exceptions() {
     let mut run = Run::new(0);

@@ -1,4 +1,4 @@
-//! Random samples, and damage that nobody thought of.
+//! Random samples, and random damage.
 use proptest::prelude::*;
 
 use super::biotac_layout::biotac;
@@ -12,7 +12,12 @@ proptest! {
 
     #[test]
     fn npy_reader_never_panics(
-        start in prop::sample::select(vec!["", "\x01\0", "\x02\0", "\x01\0\x40\0{'descr': '<i2', 'fortran_order': False, 'shape': ("]),
+        start in prop::sample::select(vec![
+            "",
+            "\x01\0",
+            "\x02\0",
+            "\x01\0\x40\0{'descr': '<i2', 'fortran_order': False, 'shape': (",
+        ]),
         bytes in proptest::collection::vec(any::<u8>(), 0..300),
     ) {
         let _ = npy::read(&[b"\x93NUMPY", start.as_bytes(), &bytes].concat());
@@ -29,7 +34,10 @@ proptest! {
 
     /// Real manifests with a few bytes changed: nearer to what happens than noise.
     #[test]
-    fn damaged_manifests_never_panic(own_format: bool, changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+    fn damaged_manifests_never_panic(
+        own_format: bool,
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
         let folder = if own_format { own().0 } else { biotac() };
         let manifest = folder.path().join(if own_format { files::OWN_MANIFEST } else { files::BIOTAC_MANIFEST });
         let mut bytes = fs::read(&manifest).unwrap();

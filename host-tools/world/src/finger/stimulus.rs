@@ -1,8 +1,8 @@
-//! What a tick of a contact does to a fingertip, and how the finger is held meanwhile.
+//! The effects of a tick of a contact on a fingertip, and the hold of the finger meanwhile.
 
-/// What a tick of a contact does to a fingertip.
+/// The effects of a tick of a contact on a fingertip.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Felt {
+pub(in super::super) struct Stimulus {
     /// Pressure in a fluid, Pa, and its slow part.
     pub(in super::super) fluid_pa: f64,
     pub(in super::super) slow_pa: f64,
@@ -11,11 +11,11 @@ pub(in super::super) struct Felt {
     pub(in super::super) vibration_n: f64,
     /// Shear on the skin, N.
     pub(in super::super) shear_n: f64,
-    /// How the mounting moves, and how it hangs.
+    /// Motion and direction of the mounting.
     pub(in super::super) held: Held,
 }
 
-/// How a finger is held: what only transducers with a mass feel.
+/// The hold of a finger: felt only by transducers with a mass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Held {
     /// Acceleration of the mounting towards the sample, g.

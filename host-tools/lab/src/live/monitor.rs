@@ -1,8 +1,8 @@
-//! What a probe says, for a display: its explorations, followed with the same core, and the map of what it knows.
+//! A probe's messages for a display: its explorations, followed with the same core, and the map of its textures.
 
 use std::rc::Rc;
 
-use tactus_core::dsp::{Plain, SpectrumSum};
+use tactus_core::dsp::SpectrumSum;
 use tactus_core::explorer::Config;
 use tactus_core::features::{BLOCK, Block, Observation};
 use tactus_core::table::Table;
@@ -19,20 +19,20 @@ const FRAME: usize = 512;
 /// Bins that are shown as one, of those over 0 Hz.
 const BINS: usize = 4;
 
-/// What has come since it was taken last.
+/// The events since the last call.
 #[derive(Default)]
 pub struct Received {
     /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
     pub pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
     pub spectra: Vec<Vec<i8>>,
-    /// What the probe said.
+    /// The probe's events.
     pub happened: Vec<Happening>,
 }
 
-/// Hears a probe.
+/// Follows a probe's messages.
 #[derive(Default)]
-pub struct Hearing {
+pub struct ProbeMonitor {
     /// The table in force, and its maps.
     table: Rc<[u8]>,
     planes: Vec<Plane>,
@@ -41,10 +41,10 @@ pub struct Hearing {
     early_ms: Option<u16>,
     /// The last samples of P_AC.
     recent: Vec<i16>,
-    heard: Received,
+    received: Received,
 }
 
-impl Hearing {
+impl ProbeMonitor {
     /// An exploration begins.
     pub fn explores(&mut self, config: Config) {
         self.followed = Followed::begin(config);
@@ -81,12 +81,12 @@ impl Hearing {
         };
     }
 
-    /// What the probe knows.
+    /// The probe's textures and movements.
     pub fn known(&self) -> &KnownTable {
         &self.known
     }
 
-    /// Where a slide lies among the textures at its movement.
+    /// Place of a slide among the textures at its movement.
     pub fn place_of(
         &self,
         table: Table<'_>,
@@ -98,17 +98,17 @@ impl Hearing {
         Some(plane.place(&distances))
     }
 
-    /// Something that the probe said.
+    /// Adds an event of the probe.
     pub fn happens(&mut self, what: Happening) {
-        self.heard.happened.push(what);
+        self.received.happened.push(what);
     }
 
-    /// What has been since the last time.
+    /// Takes the events since the last call.
     pub fn take(&mut self) -> Received {
-        std::mem::take(&mut self.heard)
+        std::mem::take(&mut self.received)
     }
 
-    /// Takes in what the probe says.
+    /// Takes a message of the probe.
     pub fn hear(&mut self, event: Event) {
         if let Event::Block(block) = &event {
             self.block(block);
@@ -117,19 +117,19 @@ impl Hearing {
         let bytes = Rc::clone(&self.table);
         let table = Table::read(&bytes).ok();
         let happening = table.and_then(|table| self.told(table, event));
-        self.heard.happened.extend(happening);
+        self.received.happened.extend(happening);
     }
 
     fn block(&mut self, block: &Block) {
         if block.number == 0 {
             self.recent.clear();
         }
-        self.heard.pac.extend_from_slice(&block.pac);
+        self.received.pac.extend_from_slice(&block.pac);
         self.recent.extend_from_slice(&block.pac);
         let older = self.recent.len().saturating_sub(FRAME);
         self.recent.drain(..older);
         if block.pac.len() == BLOCK {
-            self.heard.spectra.extend(spectrum(&self.recent));
+            self.received.spectra.extend(spectrum(&self.recent));
         }
         let looked = self.followed.block(&self.known.lengths_ms, block);
         let (Some((ms, seen)), Some(movement)) = (looked, self.followed.movement()) else {
@@ -137,7 +137,7 @@ impl Hearing {
         };
         let table = Rc::clone(&self.table);
         if let Ok(table) = Table::read(&table) {
-            self.heard.happened.push(Happening::Look {
+            self.received.happened.push(Happening::Look {
                 ms,
                 standing: self.followed.so_far(table, &seen),
                 place: self.place_of(table, movement, &seen),
@@ -178,7 +178,7 @@ impl Hearing {
                 let standing = self
                     .followed
                     .observed(table, action, seen.clone(), early_ms);
-                // the probe's own word is the one that counts
+                // the probe's own figures count
                 let standing = Standing {
                     posterior: posterior.to_vec(),
                     log_odds: standing.as_ref().and_then(|s| s.log_odds),
@@ -220,7 +220,7 @@ impl Hearing {
 
     /// A texture was learned, and the table is this one now.
     pub fn learned(&mut self) {
-        for happening in &mut self.heard.happened {
+        for happening in &mut self.received.happened {
             if let Happening::Learned { known, .. } = happening {
                 known.clone_from(&self.known);
             }
@@ -238,7 +238,7 @@ pub fn spectra(pac: &[i16]) -> Vec<Vec<i8>> {
 /// The power of these samples, dB per four bins.
 fn spectrum(samples: &[i16]) -> Option<Vec<i8>> {
     let mut sum = SpectrumSum::default();
-    sum.push::<Plain>(PLAN.angles(), samples);
+    sum.push(&PLAN, samples);
     let spectrum = sum.finish()?;
     let bins = spectrum.psd().get(1..)?.chunks_exact(BINS);
     let db = |bins: &[f32]| {
