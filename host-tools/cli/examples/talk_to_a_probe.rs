@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use tactus_core::sensor::FingerCode;
 use tactus_core::wire::{self, Counts, Event, Phase, Receiver, Report, Status};
-use tactus_link::{Port, Request};
+use tactus_link::{Port, Probe, Request};
 
 pub(crate) fn main() {
     let address = match std::env::var("TACTUS_PROBE") {
@@ -19,11 +19,15 @@ pub(crate) fn main() {
     let line = TcpStream::connect(address).expect("somebody listens");
     line.set_read_timeout(Some(Duration::from_millis(100)))
         .expect("a time");
-    let mut port = Port::new(line, Duration::from_secs(5));
+    let timeout = Duration::from_secs(5);
+    let probe = Probe::new("the probe", timeout, timeout);
+    let mut port = Port::new(line, probe.clone());
     // each report that comes on the way is shown to the closure
-    let status = port
-        .run(Request::status(), |report| println!("{report:?}"))
-        .expect("an answer");
+    let status = probe.run(Request::status(), |report| {
+        println!("{report:?}");
+        Ok(())
+    });
+    let status = port.run(status).expect("an answer");
     println!(
         "{:?}, {} textures, table {:08x}",
         status.phase, status.textures, status.table_crc

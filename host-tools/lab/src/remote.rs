@@ -1,15 +1,15 @@
-//! A probe at a line that somebody else carries, a page for example: [`Remote`] is asked in JSON, gets the bytes that came and the
-//! time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus device` does and says.
+//! A probe at a line that somebody else carries, a page for example: [`Remote`] is asked in JSON, gets the bytes that
+//! came and the time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus
+//! device` does and says.
 
-mod bench;
 #[cfg(feature = "open")]
 pub mod mcap;
 mod message;
 #[cfg(feature = "open")]
 mod open;
+pub mod operations;
 #[cfg(feature = "open")]
 mod recorded;
-#[cfg(feature = "open")]
 mod replay;
 pub mod say;
 mod session;

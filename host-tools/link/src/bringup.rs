@@ -1,34 +1,34 @@
-//! The first evening of a new rig: a person and the self-test image go through its parts step by step, then with the rig's own
-//! firmware, and what is wrong is named.
+//! The first evening of a new rig: a person and the self-test image go through its parts step by step, then with the
+//! rig's own firmware, and what is wrong is named.
 //!
-//! The board only measures ([`tactus_core::wire::bringup`]); limits and names of mistakes are here ([`judge`], [`MISTAKES`]), where a
-//! PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board ([`Board`]) and asks whoever is there
-//! ([`Person`]). It knows the core only.
+//! The board only measures ([`tactus_core::wire::bringup`]); limits and names of mistakes are here ([`judge`],
+//! [`MISTAKES`]), where a PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board
+//! ([`Board`]) and asks whoever is there ([`Person`]). It knows the core only.
 
-mod found;
 mod journal;
 pub mod judge;
 mod line;
 mod mistakes;
 mod mounted;
 mod report;
+mod result;
 mod seams;
 mod steps;
 pub mod weights;
 
-pub use found::{Found, Series};
 pub use journal::{Entry, EntryMistake, EntrySeries, Journal};
 pub use line::Line;
 pub use mistakes::{MISTAKES, Mistake, Named};
 pub use mounted::Mounted;
 pub use report::{Report, plot};
+pub use result::{Series, StepResult};
 pub use seams::{Board, Person, Probe, Trouble};
 pub use steps::{Bench, Image, STEPS, Step};
 
 use steps::Run;
 
 /// Who is at the rig, and sees how it goes.
-pub trait Owner: Person {
+pub trait Operator: Person {
     /// Sees what a step has found; whether to go on, although it has not passed.
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble>;
     /// What time it is, as 2026-11-24T19:30:00Z.
@@ -61,14 +61,14 @@ pub fn next_image(journal: &Journal) -> Option<Image> {
     next.map(Step::image)
 }
 
-/// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that takes another
-/// image.
+/// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that
+/// takes another image.
 ///
 /// # Errors
 /// See [`Trouble`].
 pub fn run(
     mut ends: Ends<'_>,
-    person: &mut dyn Owner,
+    person: &mut dyn Operator,
     journal: &mut Journal,
 ) -> Result<Ended, Trouble> {
     for step in STEPS {

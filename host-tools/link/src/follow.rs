@@ -1,5 +1,5 @@
-//! The PC follows the probe: from the reports of one exploration with streaming on, it computes everything anew with the
-//! same core, and compares.
+//! The PC follows the probe: from the reports of one exploration with streaming on, it computes everything anew with
+//! the same core, and compares.
 
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Explorer, ExplorerError, NEGLIGIBLE};
@@ -54,7 +54,8 @@ pub enum FollowError {
     },
     /// The explorer here refuses the slide that the probe reported.
     #[error(
-        "slide {slide}: the explorer here cannot use the slide; read the table of the probe again (`tactus device identify --log` does)"
+        "slide {slide}: the explorer here cannot use the slide; read the table of the probe again (`tactus device \
+             identify --log` does)"
     )]
     Observe {
         /// Number of the slide.
@@ -98,8 +99,8 @@ pub struct Agreement {
     pub rejected_only_there: u32,
     /// Verdicts compared.
     pub verdicts: u32,
-    /// Verdicts that are others here: their texture, how sure they are, whether it is unknown, what the probe would learn, or
-    /// after how many slides.
+    /// Verdicts that are others here: their texture, how sure they are, whether it is unknown, what the probe would
+    /// learn, or after how many slides.
     pub other_verdicts: u32,
 }
 

@@ -1,28 +1,35 @@
-//! The host's end of the link to the probe; without the feature `serial` without IO of its own: bytes come in, bytes go out.
+//! The host's end of the link to the probe; without the feature `serial` without IO of its own: bytes come in, bytes go
+//! out.
 //!
-//! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of them
-//! ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way.
-//! [`Exchange`] runs jobs over bytes that somebody else carries, [`Port`] over anything that reads and writes: a serial line, a TCP
-//! connection.
+//! [`Session`] makes requests and understands reports. A [`Transaction`] is one request ([`Request`]) or a sequence of
+//! them ([`PushTable`], [`ReadTable`]); [`Job`] runs it to its end, whatever is damaged or lost on the way. [`Probe`]
+//! runs jobs over bytes that somebody else carries, for [`operations`] that follow each other; [`Port`] carries its
+//! bytes over anything that reads and writes: a serial line, a TCP connection.
 
 pub mod bringup;
-pub mod exchange;
+mod error;
 pub mod follow;
 pub mod lifting;
 #[cfg(feature = "serial")]
 pub mod line;
-pub mod log;
 #[cfg(feature = "serial")]
-pub mod owner;
+pub mod lock;
+pub mod log;
+pub mod operations;
+pub mod person;
 mod port;
+pub mod probe;
 mod request;
+pub mod samples;
+pub mod say;
 mod session;
 mod table;
 mod transaction;
 
-pub use exchange::{Exchange, PortError};
+pub use error::{OperationError, PortError};
 pub use port::Port;
-pub use request::{Found, Request};
+pub use probe::Probe;
+pub use request::{Identified, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
 pub use table::{PushTable, ReadTable};
 pub use transaction::{Job, Transaction};

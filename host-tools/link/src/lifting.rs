@@ -1,4 +1,4 @@
-//! What the reports have said of the rig, and how one that moves comes to stand with its finger lifted.
+//! The state of the rig by its reports, and the way of a moving rig to a stand with its finger lifted.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ const ANSWERED: Duration = Duration::from_secs(5);
 /// A rig is asked to stop so often: a request may be damaged, and stopping twice does no harm.
 const AGAIN: Duration = Duration::from_millis(200);
 
-/// Whether a request has the rig move.
+/// Returns true for a request that has the rig move.
 pub fn moves(command: &Command) -> bool {
     matches!(
         command,
@@ -28,9 +28,9 @@ pub fn moves(command: &Command) -> bool {
     )
 }
 
-/// What the reports have said of the rig. Times are since any moment, the same for all.
+/// The state of the rig by its reports. Times are since any moment, the same for all.
 #[derive(Debug, Default)]
-pub struct RigHeard {
+pub struct RigWatch {
     /// what the rig does
     phase: Option<Phase>,
     fault: Option<Fault>,
@@ -40,7 +40,7 @@ pub struct RigHeard {
     moving: Option<u16>,
 }
 
-impl RigHeard {
+impl RigWatch {
     /// Takes in a report.
     pub fn hear(&mut self, report: &Report, now: Duration) {
         match &report.event {
@@ -63,7 +63,7 @@ impl RigHeard {
     }
 }
 
-/// What came of stopping.
+/// The result of a stop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Stopped {
     /// All is well.
@@ -74,7 +74,8 @@ pub enum Stopped {
     NotHome,
     /// The probe did not answer, or nobody waits for it.
     #[error(
-        "the probe has not said that the finger is lifted: it may still be down. Look at the rig; its emergency stop lifts it"
+        "the probe has not said that the finger is lifted: it may still be down. Look at the rig; its emergency stop \
+             lifts it"
     )]
     NotLifted,
 }
@@ -87,8 +88,8 @@ pub struct Lifting {
 }
 
 impl Lifting {
-    /// What was said of the rig so far does not count any more.
-    pub fn begin(rig: &mut RigHeard, now: Duration) -> Self {
+    /// Begins; earlier reports of the rig no longer count.
+    pub fn begin(rig: &mut RigWatch, now: Duration) -> Self {
         (rig.phase, rig.fault) = (None, None);
         Self {
             began: now,
@@ -96,7 +97,7 @@ impl Lifting {
         }
     }
 
-    /// What is to be sent now.
+    /// Returns the commands that are to be sent now.
     pub fn asks(&mut self, now: Duration) -> Option<[Command; 3]> {
         let due = self.asked.is_none_or(|at| now.saturating_sub(at) > AGAIN);
         due.then(|| {
@@ -105,8 +106,8 @@ impl Lifting {
         })
     }
 
-    /// What came of it; `None`: it is still on its way.
-    pub fn came(&self, rig: &RigHeard, now: Duration) -> Option<Stopped> {
+    /// The result; `None` while the rig is on its way.
+    pub fn came(&self, rig: &RigWatch, now: Duration) -> Option<Stopped> {
         let since = now.saturating_sub(self.began);
         if since >= LIFTING {
             return Some(Stopped::NotLifted);

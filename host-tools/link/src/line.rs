@@ -1,4 +1,4 @@
-//! What carries bytes to the probe: serial ports and TCP ports, by the names that `--port` takes.
+//! Carriers of bytes to the probe: serial ports and TCP ports, by the names that `--port` takes.
 
 use std::fmt;
 use std::io::{self, Read, Write};
@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
 
-use super::owner::{Owned, Owner};
+use super::lock::{PortInUse, PortLock};
 
 /// The probe's line.
 const BAUD: u32 = 921_600;
@@ -17,34 +17,36 @@ const READ: Duration = Duration::from_millis(50);
 /// USB vendor of the NUCLEO's ST-LINK.
 const ST: u16 = 0x0483;
 
-/// Why there is no line to the probe, and what to do.
+/// An error on the way to a line, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
     /// Nothing is plugged in.
     #[error(
-        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try --emulated"
+        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try \
+             --emulated"
     )]
     None,
     /// More than one.
     #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
-    Several(Vec<Found>),
+    Several(Vec<PortInfo>),
     /// No such port.
     #[error("{port}: there is no such port. {}", others(.found))]
     NotThere {
         /// Its name.
         port: String,
         /// Those that there are.
-        found: Vec<Found>,
+        found: Vec<PortInfo>,
     },
     /// Another program has it.
     #[error(
-        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close that; \
+        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close \
+             that; \
          `fuser -v {0}` names it"
     )]
     Busy(String),
     /// Another tactus has it.
     #[error(transparent)]
-    Owned(#[from] Owned),
+    InUse(#[from] PortInUse),
     /// The user may not.
     #[error(
         "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
@@ -55,7 +57,7 @@ pub enum LineError {
     Serial {
         /// Its name.
         port: String,
-        /// What the system says.
+        /// The system's words.
         why: serialport::Error,
     },
     /// No such address, or nobody there.
@@ -65,28 +67,28 @@ pub enum LineError {
     Tcp {
         /// Host and port.
         address: String,
-        /// What the system says.
+        /// The system's words.
         why: io::Error,
     },
 }
 
 /// A serial port of this PC.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Found {
+pub struct PortInfo {
     /// Its name.
     pub name: String,
-    /// What the USB device says of itself, if it is one.
+    /// The USB device's description of itself, if it is one.
     pub usb: Option<UsbPortInfo>,
 }
 
-impl Found {
-    /// Whether it is an ST-LINK, as a NUCLEO has.
+impl PortInfo {
+    /// Returns true for an ST-LINK, as a NUCLEO has.
     pub fn is_nucleo(&self) -> bool {
         self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
     }
 }
 
-impl From<SerialPortInfo> for Found {
+impl From<SerialPortInfo> for PortInfo {
     fn from(port: SerialPortInfo) -> Self {
         let usb = match port.port_type {
             SerialPortType::UsbPort(usb) => Some(usb),
@@ -99,7 +101,7 @@ impl From<SerialPortInfo> for Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for PortInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<16}", self.name)?;
         let Some(usb) = &self.usb else {
@@ -118,12 +120,12 @@ impl fmt::Display for Found {
 }
 
 /// A line for each.
-pub fn lines(ports: &[Found]) -> String {
+pub fn lines(ports: &[PortInfo]) -> String {
     let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
     lines.join("\n")
 }
 
-fn others(found: &[Found]) -> String {
+fn others(found: &[PortInfo]) -> String {
     if found.is_empty() {
         "This PC has no serial port now: plug in the board's USB socket CN1, or try --emulated"
             .to_owned()
@@ -133,11 +135,11 @@ fn others(found: &[Found]) -> String {
 }
 
 /// The serial ports of this PC; boards first. Those of the mainboard that no chip answers at are left out.
-pub fn found() -> Vec<Found> {
+pub fn found() -> Vec<PortInfo> {
     let ports = serialport::available_ports().unwrap_or_default();
-    let mut ports: Vec<Found> = ports
+    let mut ports: Vec<PortInfo> = ports
         .into_iter()
-        .map(Found::from)
+        .map(PortInfo::from)
         // every Linux has 32 of these, there or not
         .filter(|port| port.usb.is_some() || !port.name.starts_with("/dev/ttyS"))
         .collect();
@@ -145,7 +147,7 @@ pub fn found() -> Vec<Found> {
     ports
 }
 
-/// What carries bytes to the probe and back; reads come back soon, with or without any.
+/// A carrier of bytes to the probe and back; reads come back soon, with or without any.
 pub trait Line: Read + Write + Send {}
 impl<T: Read + Write + Send> Line for T {}
 
@@ -153,24 +155,24 @@ impl<T: Read + Write + Send> Line for T {}
 ///
 /// # Errors
 /// See [`LineError`].
-pub fn open(name: &str) -> Result<(Box<dyn Line>, Owner), LineError> {
+pub fn open(name: &str) -> Result<(Box<dyn Line>, PortLock), LineError> {
     // however its address was written
     let same = tcp_address(name).map(|address| format!("tcp:{address}"));
-    let owner = Owner::take(same.as_deref().unwrap_or(name))?;
+    let lock = PortLock::take(same.as_deref().unwrap_or(name))?;
     let line = match tcp_address(name) {
         Some(address) => tcp(address)?,
         None => serial(name)?,
     };
     tracing::info!(port = name, "opens");
-    Ok((line, owner))
+    Ok((line, lock))
 }
 
 /// The only NUCLEO among these.
 ///
 /// # Errors
 /// There is none, or there are several.
-pub fn only_nucleo(found: Vec<Found>) -> Result<String, LineError> {
-    let mut nucleos: Vec<Found> = found.into_iter().filter(Found::is_nucleo).collect();
+pub fn only_nucleo(found: Vec<PortInfo>) -> Result<String, LineError> {
+    let mut nucleos: Vec<PortInfo> = found.into_iter().filter(PortInfo::is_nucleo).collect();
     match nucleos.len() {
         0 => Err(LineError::None),
         1 => Ok(nucleos.remove(0).name),
@@ -230,7 +232,7 @@ pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
 mod tests {
     use super::*;
 
-    fn port(name: &str, vid: u16) -> Found {
+    fn port(name: &str, vid: u16) -> PortInfo {
         let usb = UsbPortInfo {
             vid,
             pid: 0x374b,
@@ -238,7 +240,7 @@ mod tests {
             manufacturer: None,
             product: Some("STM32 STLink".into()),
         };
-        Found {
+        PortInfo {
             name: name.into(),
             usb: Some(usb),
         }
@@ -287,7 +289,7 @@ mod tests {
             port("/dev/ttyACM0", ST).to_string(),
             "/dev/ttyACM0      0483:374b  STM32 STLink  066EFF  <- a NUCLEO: try this one"
         );
-        let plain = Found {
+        let plain = PortInfo {
             name: "/dev/ttyAMA0".into(),
             usb: None,
         };

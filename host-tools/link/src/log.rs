@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use tactus_core::wire::{Command, PROTOCOL, Report};
 
 /// One line.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Line<'a> {
     /// The first one: who wrote it.
@@ -82,17 +82,8 @@ impl Log {
         Ok(log)
     }
 
-    /// Something is asked of the probe.
-    pub fn asked(&mut self, command: &Command) {
-        self.line(&Line::Command(Box::new(Cow::Borrowed(command))));
-    }
-
-    /// The probe says something.
-    pub fn told(&mut self, report: &Report) {
-        self.line(&Line::Report(Box::new(Cow::Borrowed(report))));
-    }
-
-    fn line(&mut self, line: &Line<'_>) {
+    /// Writes a line.
+    pub fn line(&mut self, line: &Line<'_>) {
         if self.failed.is_ok() {
             self.failed = line.write(&mut self.file);
         }

@@ -32,9 +32,9 @@ impl<T> Transaction for Request<T> {
     }
 }
 
-/// What an exploration found.
+/// The result of an exploration.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Found {
+pub struct Identified {
     /// The verdict.
     pub verdict: Verdict,
     /// Slides that the probe has learned from by itself.
@@ -84,7 +84,7 @@ impl Request<()> {
 }
 
 impl Request<Status> {
-    /// How the probe is.
+    /// Asks for the status of the probe.
     pub fn status() -> Self {
         Self::new(Command::Status, None, |event, answer| {
             if let Event::Status(status) = event {
@@ -145,19 +145,19 @@ fn take_calibration(event: &Event, answer: &mut Option<RigCalibration>) -> Resul
     Ok(())
 }
 
-impl Request<Found> {
+impl Request<Identified> {
     /// Has the probe find out what lies under its finger.
     pub fn identify(how: Identify) -> Self {
         Self::new(Command::Identify(how), None, |event, answer| {
             match (event, answer) {
                 (Event::Verdict(verdict), answer) => {
-                    *answer = Some(Found {
+                    *answer = Some(Identified {
                         verdict: verdict.clone(),
                         learned: 0,
                     });
                 }
-                (Event::TextureLearned(learned), Some(found)) if learned.itself => {
-                    found.learned = learned.slides;
+                (Event::TextureLearned(learned), Some(identified)) if learned.itself => {
+                    identified.learned = learned.slides;
                 }
                 _ => {}
             }

@@ -15,7 +15,8 @@ pub const MAX_TRIES: u8 = 5;
 /// What to do about a probe that speaks this version.
 fn remedy(of: &u8) -> &'static str {
     if *of > PROTOCOL {
-        "this program is older, install the tactus of the probe's version, or flash this one's firmware: `tactus device flash`"
+        "this program is older, install the tactus of the probe's version, or flash this one's firmware: `tactus \
+             device flash`"
     } else {
         "the probe is older, flash the firmware of this version: `tactus device flash`"
     }
@@ -52,7 +53,8 @@ pub enum LinkError {
     Disturbed,
     /// Whole frames come, and none of them is a message that is known here.
     #[error(
-        "the other end speaks another version of the messages than this program (version {PROTOCOL}): flash the firmware of this version, `tactus device flash`"
+        "the other end speaks another version of the messages than this program (version {PROTOCOL}): flash the \
+             firmware of this version, `tactus device flash`"
     )]
     Foreign,
     /// The request is over, and its answer did not come.

@@ -6,8 +6,8 @@ use tactus_core::wire::{Command, Event, PART};
 use super::session::{LinkError, MAX_TRIES};
 use super::transaction::Transaction;
 
-/// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and has
-/// it taken into use.
+/// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and
+/// has it taken into use.
 #[derive(Clone, Debug)]
 pub struct PushTable {
     bytes: Vec<u8>,
@@ -68,7 +68,8 @@ impl Transaction for PushTable {
     }
 }
 
-/// Reads the table that the probe uses; its bytes, checked. The probe decides whether it sends one part per request or all.
+/// Reads the table that the probe uses; its bytes, checked. The probe decides whether it sends one part per request or
+/// all.
 #[derive(Clone, Debug, Default)]
 pub struct ReadTable {
     bytes: Vec<u8>,

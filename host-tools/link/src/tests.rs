@@ -190,8 +190,8 @@ impl Probe {
     }
 }
 
-/// Runs a transaction to its end over a line that does to every chunk what `disturb` does; `None` if both ends wait for each
-/// other and the request may not be repeated.
+/// Runs a transaction to its end over a line that does to every chunk what `disturb` does; `None` if both ends wait for
+/// each other and the request may not be repeated.
 fn see_through<E: Transaction>(
     session: &mut Session,
     probe: &mut Probe,
@@ -321,7 +321,7 @@ fn requests_get_their_answers() {
         undisturbed,
     );
     let found = found.unwrap().unwrap();
-    let Found { verdict, learned } = found;
+    let Identified { verdict, learned } = found;
     assert_eq!((verdict.name.as_str(), verdict.slides), ("velcro", 3));
     assert_eq!((learned, verdict.log_odds), (3, Some(-7.5)));
     let named = |name| Request::label(Name::try_from(name).unwrap());
@@ -504,13 +504,23 @@ fn a_port_runs_transactions() {
         answer: VecDeque::new(),
         silent: false,
     };
-    let mut port = Port::new(line, Duration::from_millis(50));
-    port.run(PushTable::new(&bytes).unwrap(), |_| ()).unwrap();
-    assert_eq!(port.run(ReadTable::default(), |_| ()).unwrap(), bytes);
-    assert_eq!(port.session().damaged(), 0);
+    let time = Duration::from_millis(50);
+    let probe = super::Probe::new("here", time, time);
+    let mut port = Port::new(line, probe.clone());
+    let push = PushTable::new(&bytes).unwrap();
+    port.run(probe.get(push)).unwrap();
+    assert_eq!(*port.run(probe.table()).unwrap(), *bytes);
+    assert_eq!(probe.losses(), (0, 0));
     port.stream.silent = true;
-    let silent = port.run(ReadTable::default(), |_| ()).unwrap_err();
-    assert!(matches!(silent, PortError::Silent(_)), "{silent}");
+    // pulled once, and known from then on
+    assert_eq!(*port.run(probe.table()).unwrap(), *bytes);
+    let silent = port.run(probe.get(ReadTable::default())).unwrap_err();
+    assert!(
+        silent
+            .to_string()
+            .starts_with("here: the probe said nothing for"),
+        "{silent}"
+    );
 }
 
 /// What a line may do to a stretch of bytes.
@@ -537,17 +547,71 @@ impl Write for Noise {
 #[test]
 fn bytes_without_end_are_no_answer() {
     for request in [Command::Stop, Command::Home].map(Request::command) {
-        let mut port = Port::new(Noise, Duration::from_millis(1));
-        let mut job = port.begin(request).unwrap();
+        let time = Duration::from_millis(1);
+        let probe = super::Probe::new("here", time, time);
+        let mut port = Port::new(Noise, probe.clone());
         let began = Instant::now();
-        let why = loop {
-            assert!(began.elapsed() < Duration::from_secs(10));
-            if let Err(why) = port.step(&mut job, |_| {}) {
-                break why;
-            }
-        };
-        assert!(matches!(why, PortError::Garbage(1..)), "{why}");
+        let why = port.run(probe.get(request)).unwrap_err();
+        assert!(began.elapsed() < Duration::from_secs(10));
+        let is_garbage = |why: &PortError| matches!(why, PortError::Garbage(1..));
+        let garbage = matches!(&why, OperationError::Port { why, .. } if is_garbage(why));
+        assert!(garbage, "{why}");
     }
+}
+
+/// Does an operation; its file is kept or not, and its question answered like this.
+fn does<T>(
+    operation: impl Future<Output = T>,
+    host: &super::Probe,
+    probe: &mut Probe,
+    (keeps, says): (bool, bool),
+) -> T {
+    let (mut operation, mut now) = (std::pin::pin!(operation), Duration::ZERO);
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    loop {
+        if let Poll::Ready(done) = operation.as_mut().poll(&mut context) {
+            return done;
+        }
+        now += Duration::from_millis(10);
+        host.carry(&probe.receive(&host.to_send()), now);
+        if let Some(backup) = host.backup() {
+            assert_eq!(backup.bytes, probe.table);
+            let full = Err("the disk is full".to_owned());
+            host.kept(if keeps { Ok(backup.name) } else { full });
+        }
+        if host.question().is_some() {
+            host.answer(says);
+        }
+    }
+}
+
+#[test]
+fn nothing_is_lost_without_a_copy_and_a_yes() {
+    let mut probe = Probe {
+        parts: usize::MAX,
+        table: table(3),
+        ..Probe::default()
+    };
+    let time = Duration::from_secs(5);
+    let host = super::Probe::new("here", time, time);
+    let forget = || operations::forget(&host, Forget::SelfLearned);
+    let forgets = |command: &Command| matches!(command, Command::Forget(_));
+    let reads = |command: &Command| matches!(command, Command::ReadTable(_));
+    for (answers, why) in [
+        ((false, true), "the disk is full"),
+        ((true, false), "nothing was changed"),
+    ] {
+        let said = does(forget(), &host, &mut probe, answers).unwrap_err();
+        assert_eq!(said.to_string(), why);
+        assert!(!probe.asked.iter().any(forgets));
+    }
+    does(forget(), &host, &mut probe, (true, true)).unwrap();
+    assert!(probe.asked.iter().any(forgets));
+    // pulled once, and once more after it may have become another one
+    let pulled = |probe: &Probe| probe.asked.iter().filter(|c| reads(c)).count();
+    assert_eq!(pulled(&probe), 1);
+    does(host.table(), &host, &mut probe, (true, true)).unwrap();
+    assert_eq!(pulled(&probe), 2);
 }
 
 fn damage() -> impl Strategy<Value = Vec<(usize, u8)>> {

@@ -43,8 +43,8 @@ struct Sent {
 /// A transaction under way. One of its commands is under way at a time; the owner of the [`Session`] may send others in
 /// between, to stop for example.
 ///
-/// Where the line damages a request or a report, the job repeats a request that may be made twice. Any other request is left
-/// to the caller: the damaged report need not have been its answer.
+/// Where the line damages a request or a report, the job repeats a request that may be made twice. Any other request is
+/// left to the caller: the damaged report need not have been its answer.
 #[derive(Debug)]
 pub struct Job<E> {
     transaction: E,
@@ -69,8 +69,8 @@ impl<E: Transaction> Job<E> {
         Ok(job)
     }
 
-    /// Goes on with the bytes that were received (none are fine too): appends what is to be sent to `send`, and shows all
-    /// reports to `each`. Not to be polled again once it is ready.
+    /// Goes on with the bytes that were received (none are fine too): appends what is to be sent to `send`, and shows
+    /// all reports to `each`. Not to be polled again once it is ready.
     pub fn poll(
         &mut self,
         session: &mut Session,

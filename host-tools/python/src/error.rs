@@ -21,7 +21,7 @@ use tactus_lab::sim::collection::TrialError;
 use tactus_lab::sim::rig::SimError;
 use tactus_link::line::LineError;
 use tactus_link::log::LogError;
-use tactus_link::{LinkError, PortError};
+use tactus_link::{LinkError, OperationError};
 
 create_exception!(
     tactus,
@@ -122,7 +122,7 @@ raise! {
     SimError => SimulationError,
     LineError => ProbeError,
     LinkError => ProbeError,
-    PortError => ProbeError,
+    OperationError => ProbeError,
     LogError => ProbeError,
     TrialError => SimulationError,
 }

@@ -3,20 +3,24 @@
 use std::collections::VecDeque;
 use std::fs::File;
 use std::path::PathBuf;
+use std::pin::Pin;
 use std::sync::{Mutex, PoisonError};
 use std::task::Poll;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tactus_core::table::{Name, Table as Read};
 use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
-use tactus_lab::data::recorder::Recorder;
+use tactus_lab::remote::operations::{Wanted, record};
+use tactus_link::lifting::Stopped;
 use tactus_link::line::{Line, found, only_nucleo, open};
+use tactus_link::lock::PortLock;
 use tactus_link::log::{self, Log};
-use tactus_link::owner::Owner;
-use tactus_link::{Job, Port, PortError, PushTable, ReadTable, Request, Transaction};
+use tactus_link::operations::{self, Sample};
+use tactus_link::{OperationError, Port, PortError, PushTable, Request, Transaction};
+use tactus_link::{Probe as Linked, say};
 
 use crate::arguments;
 use crate::error::{ProbeError, Raise as _};
@@ -24,82 +28,89 @@ use crate::recordings::Slide;
 use crate::table::Table;
 use crate::values::object;
 
-/// Longest that a request takes to end after it was stopped: the way up, and what may be stored first.
-const STOPPING: Duration = Duration::from_secs(35);
-
-/// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a probe that says
-/// nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests and reports, as
+/// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a
+/// probe that says nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests
+/// and reports, as
 /// `tactus device --log FILE` writes it, for `read_log`, `tactus device log` and `tactus convert`.
 ///
-/// Raises ProbeError where there is no such port, or somebody else has it; OSError where there is such a file, or it cannot be written.
+/// Raises ProbeError where there is no such port, or somebody else has it; OSError where there is such a file, or it
+/// cannot be written.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Probe {
     name: String,
-    /// What is to be sent while something is under way: whoever reads the port sends it.
-    outgoing: Mutex<Vec<Command>>,
+    linked: Linked,
     inner: Mutex<Option<Inner>>,
 }
+
+/// A request under way.
+type Job = Pin<Box<dyn Future<Output = Result<(), OperationError>> + Send>>;
 
 struct Inner {
     port: Port<Box<dyn Line>>,
     log: Option<Log>,
     /// what is under way, and the reports of it that nobody has taken yet
-    job: Option<Job<Request<()>>>,
+    job: Option<Job>,
     reports: VecDeque<Report>,
-    _owner: Owner,
+    _lock: PortLock,
 }
 
 impl Inner {
-    fn asks(&mut self, command: &Command) {
-        if let Some(log) = &mut self.log {
-            log.asked(command);
+    /// Polls an operation once, and keeps what came.
+    fn poll<F: Future>(&mut self, operation: Pin<&mut F>) -> PyResult<Poll<F::Output>> {
+        let polled = self.port.poll(operation);
+        for line in self.port.probe().said() {
+            if let Some(log) = &mut self.log {
+                log.line(&line);
+            }
+            if let log::Line::Report(report) = line {
+                self.reports.push_back(report.into_owned());
+            }
         }
+        // a program has the results
+        self.port.probe().take_words();
+        // what was said is in the file before it is believed
+        self.log.as_mut().map_or(Ok(()), Log::flush)?;
+        Ok(polled)
     }
 
-    /// Begins a transaction; its first request is in the log.
-    fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, PortError> {
-        let job = self.port.begin(transaction)?;
-        if let Some(command) = job.command() {
-            self.asks(&command.clone());
-        }
-        Ok(job)
-    }
-
-    /// Reads once, and keeps what came.
-    fn step(&mut self) -> Result<(), PortError> {
-        let Some(job) = &mut self.job else {
+    /// Reads once for what is under way.
+    fn step(&mut self) -> PyResult<()> {
+        let Some(mut job) = self.job.take() else {
             return Ok(());
         };
-        let (reports, log) = (&mut self.reports, &mut self.log);
-        let stepped = self.port.step(job, |report| {
-            if let Some(log) = log {
-                log.told(report);
+        match self.poll(Pin::new(&mut job))? {
+            Poll::Ready(done) => done.map_err(|why| why.raise()),
+            Poll::Pending => {
+                self.job = Some(job);
+                Ok(())
             }
-            reports.push_back(report.clone());
-        });
-        if !matches!(stepped, Ok(Poll::Pending)) {
-            self.job = None;
         }
-        stepped.map(|_| ())
     }
 
     /// Stops what is under way, and waits until the finger is lifted.
-    fn stop(&mut self) -> Result<(), PortError> {
-        if self.job.is_none() {
+    fn stop(&mut self) -> PyResult<()> {
+        let Some(mut job) = self.job.take() else {
             return Ok(());
-        }
-        self.asks(&Command::Stop);
-        self.port.send(Command::Stop)?;
-        let began = Instant::now();
-        while self.job.is_some() && began.elapsed() < STOPPING {
-            match self.step() {
-                // a request that was stopped is refused
-                Err(PortError::Link(_)) | Ok(()) => {}
-                Err(why) => return Err(why),
+        };
+        self.port.probe().stop();
+        let done = loop {
+            if let Poll::Ready(done) = self.poll(Pin::new(&mut job))? {
+                break done;
             }
-        }
+        };
+        self.port.probe().clear_stop();
         self.reports.clear();
-        Ok(())
+        match done {
+            Ok(())
+            | Err(
+                OperationError::Stopped(Stopped::Lifted)
+                | OperationError::Port {
+                    why: PortError::Link(_),
+                    ..
+                },
+            ) => Ok(()),
+            Err(why) => Err(why.raise()),
+        }
     }
 }
 
@@ -108,44 +119,48 @@ impl Probe {
     fn with<T: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Inner) -> Result<T, PortError> + Send,
+        work: impl FnOnce(&mut Inner) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         py.detach(|| {
             let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             let inner = inner.as_mut();
-            let inner = inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?;
-            let done = work(inner).map_err(|why| why.raise_of(&self.name))?;
-            // what was said is in the file before it is believed
-            inner.log.as_mut().map_or(Ok(()), Log::flush)?;
-            Ok(done)
+            work(inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?)
         })
     }
 
-    /// Runs a transaction that moves nothing to its end.
-    fn complete<E: Transaction + Send>(
+    /// Does an operation. Ctrl-C stops it, and the rig with it.
+    fn complete<T: Send>(
         &self,
         py: Python<'_>,
-        transaction: E,
-    ) -> PyResult<E::Outcome>
+        operation: impl Future<Output = Result<T, OperationError>> + Send,
+    ) -> PyResult<T> {
+        self.idle(py)?;
+        let mut operation = std::pin::pin!(operation);
+        let mut signal = Ok(());
+        let done = loop {
+            let polled = self.with(py, |inner| inner.poll(operation.as_mut()))?;
+            if let Poll::Ready(done) = polled {
+                break done;
+            }
+            if signal.is_ok() {
+                signal = py.check_signals();
+                if signal.is_err() {
+                    self.linked.stop();
+                }
+            }
+        };
+        if signal.is_err() {
+            self.linked.clear_stop();
+        }
+        signal.and_then(|()| done.map_err(|why| why.raise()))
+    }
+
+    /// Does one request.
+    fn get<E: Transaction + Send>(&self, py: Python<'_>, request: E) -> PyResult<E::Outcome>
     where
         E::Outcome: Send,
     {
-        self.idle(py)?;
-        let mut job = self.with(py, |inner| inner.begin(transaction))?;
-        loop {
-            let stepped = self.with(py, |inner| {
-                let log = &mut inner.log;
-                inner.port.step(&mut job, |report| {
-                    if let Some(log) = log {
-                        log.told(report);
-                    }
-                })
-            })?;
-            if let Poll::Ready(outcome) = stepped {
-                return Ok(outcome);
-            }
-            py.check_signals()?;
-        }
+        self.complete(py, self.linked.get(request))
     }
 
     fn idle(&self, py: Python<'_>) -> PyResult<()> {
@@ -160,9 +175,11 @@ impl Probe {
     fn begin(slf: &Bound<'_, Self>, command: Command) -> PyResult<Events> {
         let (probe, py) = (slf.get(), slf.py());
         probe.idle(py)?;
+        let linked = probe.linked.clone();
+        let job = async move { linked.get(Request::command(command)).await };
         probe.with(py, |inner| {
             inner.reports.clear();
-            inner.job = Some(inner.begin(Request::command(command))?);
+            inner.job = Some(Box::pin(job));
             Ok(())
         })?;
         Ok(Events {
@@ -177,11 +194,6 @@ impl Probe {
                 if let Some(report) = inner.reports.pop_front() {
                     return Ok((Some(report), true));
                 }
-                let mut outgoing = self.outgoing.lock().unwrap_or_else(PoisonError::into_inner);
-                for command in outgoing.drain(..) {
-                    inner.port.send(command)?;
-                }
-                drop(outgoing);
                 inner.step()?;
                 let report = inner.reports.pop_front();
                 Ok((report, inner.job.is_some() || !inner.reports.is_empty()))
@@ -227,8 +239,7 @@ fn seed_of_now() -> u32 {
 }
 
 fn name_of(name: &str) -> PyResult<Name> {
-    let name = Name::try_from(name.trim()).ok().filter(|n| !n.is_empty());
-    name.ok_or_else(|| PyValueError::new_err("the name of a texture has 1 to 40 bytes"))
+    say::name_of(name).map_err(|why| PyValueError::new_err(why.to_string()))
 }
 
 /// "Busy", "Pressed", ..., or {"Slid": {"length_um": ..., "speed_um_s": ...}}, as on the link.
@@ -261,22 +272,23 @@ impl Probe {
     ) -> PyResult<Self> {
         let timeout = Duration::try_from_secs_f64(timeout_s)
             .map_err(|why| PyValueError::new_err(format!("timeout_s: {why}")))?;
-        let (name, line, owner) = py
+        let (name, line, lock) = py
             .detach(|| {
                 let name = port.map_or_else(|| only_nucleo(found()), Ok)?;
-                open(&name).map(|(line, owner)| (name, line, owner))
+                open(&name).map(|(line, lock)| (name, line, lock))
             })
             .map_err(|why| why.raise())?;
         let log = log.map(|path| Log::create(&path, &name)).transpose()?;
+        let linked = Linked::new(&name, timeout, timeout);
         Ok(Self {
             name,
-            outgoing: Mutex::default(),
+            linked: linked.clone(),
             inner: Mutex::new(Some(Inner {
-                port: Port::new(line, timeout),
+                port: Port::new(line, linked),
                 log,
                 job: None,
                 reports: VecDeque::new(),
-                _owner: owner,
+                _lock: lock,
             })),
         })
     }
@@ -289,32 +301,32 @@ impl Probe {
 
     /// How the probe is: a dict with phase, fault, textures, table_crc, finger, counts and so on, as on the link.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        object(py, &self.complete(py, Request::status())?)
+        object(py, &self.get(py, Request::status())?)
     }
 
     /// The `Table` in use.
     fn table(&self, py: Python<'_>) -> PyResult<Table> {
-        Table::of(self.complete(py, ReadTable::default())?)
+        Table::of(self.complete(py, self.linked.table())?.to_vec())
     }
 
     /// Gives the probe a `Table`, which it keeps and uses from now on.
     fn write_table(&self, py: Python<'_>, table: &Table) -> PyResult<()> {
         let push = PushTable::new(&table.bytes).map_err(|why| why.raise())?;
-        self.complete(py, push)
+        self.get(py, push)
     }
 
     /// Says how far an arm is with an order, while something is under way: see `Rig`.
     fn _tell_arm(&self, number: u16, state: &Bound<'_, PyAny>) -> PyResult<()> {
         let state: ArmState = state_of(state)?;
         let report = ArmReport { number, state };
-        let mut outgoing = self.outgoing.lock().unwrap_or_else(PoisonError::into_inner);
-        outgoing.push(Command::Arm(report));
-        Ok(())
+        // whoever reads the port sends it
+        let sent = self.linked.send(Command::Arm(report));
+        sent.map_err(|why| why.raise())
     }
 
     /// Whether the probe sends raw samples (events `Block` and `Pdc`) from now on.
     fn stream(&self, py: Python<'_>, on: bool) -> PyResult<()> {
-        self.complete(py, Request::command(Command::Stream(on)))
+        self.get(py, Request::command(Command::Stream(on)))
     }
 
     /// Has the rig find its limit switches: an iterator of events.
@@ -322,13 +334,13 @@ impl Probe {
         Self::begin(slf, Command::Home)
     }
 
-    /// Has the probe find out what lies under its finger: an iterator of its reports, dicts with number, at_ms (its clock) and event
-    /// as on the link: Chosen, SlideReport (with a `posterior` of one probability for each texture), Rejected, Verdict and others. Ctrl-C
-    /// and `close()` stop the rig and lift the finger.
+    /// Has the probe find out what lies under its finger: an iterator of its reports, dicts with number, at_ms (its
+    /// clock) and event as on the link: Chosen, SlideReport (with a `posterior` of one probability for each texture),
+    /// Rejected, Verdict and others. Ctrl-C and `close()` stop the rig and lift the finger.
     ///
-    /// among: names of the textures that it may be. Other arguments as of `Explorer`. learn: whether the probe learns from a verdict
-    /// that is certain. seed: where slides begin, and random choices; drawn anew, unless given. Into a log go the table first and raw
-    /// samples, too: with them `tactus device log replay` computes every decision again.
+    /// among: names of the textures that it may be. Other arguments as of `Explorer`. learn: whether the probe learns
+    /// from a verdict that is certain. seed: where slides begin, and random choices; drawn anew, unless given. Into a
+    /// log go the table first and raw samples, too: with them `tactus device log replay` computes every decision again.
     ///
     /// Raises ProbeError where the probe refuses or is gone, KeyError for a texture that it does not know.
     #[pyo3(signature = (*, among=None, method=None, threshold=0.99, max_slides=10, open=true, learn=false, false_alarm=None, seed=None))]
@@ -380,9 +392,9 @@ impl Probe {
         Self::begin(slf, Command::Identify(wanted))
     }
 
-    /// Has the probe learn what lies under its finger, by this name: an iterator of its reports, as of `identify`; TrainingSlide
-    /// comes with each slide. trials: of each movement in the end, those of an unfinished training included. pilot: all movements of
-    /// the grid.
+    /// Has the probe learn what lies under its finger, by this name: an iterator of its reports, as of `identify`;
+    /// TrainingSlide comes with each slide. trials: of each movement in the end, those of an unfinished training
+    /// included. pilot: all movements of the grid.
     #[pyo3(signature = (name, *, trials=5, pilot=false, seed=None))]
     fn train(
         slf: &Bound<'_, Self>,
@@ -402,46 +414,43 @@ impl Probe {
 
     /// Tells the probe which texture it explored last: it learns from those slides.
     fn teach(&self, py: Python<'_>, name: &str) -> PyResult<u8> {
-        Ok(self.complete(py, Request::label(name_of(name)?))?.slides)
+        Ok(self.get(py, Request::label(name_of(name)?))?.slides)
     }
 
-    /// Records slides of what lies under the finger, movements of the probe's table in turn: a list of `Slide` of that texture. Slides
-    /// that did not arrive whole are left out. Ctrl-C stops the rig and lifts the finger.
+    /// Records slides of what lies under the finger, movements of the probe's table in turn: a list of `Slide` of that
+    /// texture. Slides that did not arrive whole are left out. Ctrl-C stops the rig and lifts the finger.
     #[pyo3(signature = (texture, *, slides=15, seed=None))]
     fn record(
-        slf: &Bound<'_, Self>,
+        &self,
+        py: Python<'_>,
         texture: &str,
         slides: u8,
         seed: Option<u32>,
     ) -> PyResult<Vec<Slide>> {
-        let (probe, py) = (slf.get(), slf.py());
-        let calibration = probe.complete(py, Request::read_calibration())?;
-        probe.stream(py, true)?;
-        let wanted = Recorder::wanted(0, slides, seed.unwrap_or_else(seed_of_now));
-        Self::begin(slf, Command::Identify(wanted))?;
-        let (mut recorder, mut made) = (Recorder::new(calibration.pressure), Vec::new());
-        while let Some(report) = probe.next(py)? {
-            if let Some(Ok(slide)) = recorder.hear(0, &report) {
-                made.push(Slide::new(slide, texture));
-            }
-        }
-        probe.stream(py, false)?;
-        Ok(made)
+        let wanted = Wanted {
+            name: texture.to_owned(),
+            index: 0,
+            slides,
+            sample: Sample::Noted(None),
+            seed: seed.unwrap_or_else(seed_of_now),
+        };
+        let recorded = self.complete(py, record(&self.linked, &wanted))?;
+        let slides = recorded.slides.into_iter();
+        Ok(slides
+            .map(|(slide, _)| Slide::new(slide, texture))
+            .collect())
     }
 
     /// Stops what is under way and lifts the finger.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.with(py, Inner::stop)?;
-        self.complete(py, Request::command(Command::Stop))
+        self.complete(py, operations::stop(&self.linked))
     }
 
     /// Frames that were damaged, and reports that were lost on the line so far.
     #[getter]
-    fn losses(&self, py: Python<'_>) -> PyResult<(u64, u64)> {
-        self.with(py, |inner| {
-            let session = inner.port.session();
-            Ok((session.damaged(), session.missing()))
-        })
+    fn losses(&self) -> (u64, u64) {
+        self.linked.losses()
     }
 
     /// Stops what is under way, and gives the port back.
@@ -469,8 +478,9 @@ impl Probe {
     }
 }
 
-/// Reads a log that `tactus device --log FILE` wrote: a list of dicts, one for each line, each with one key: "session" (who wrote it),
-/// "command" (what the probe was asked for) or "report" (number, at_ms and event, as `Probe.identify` gives them).
+/// Reads a log that `tactus device --log FILE` wrote: a list of dicts, one for each line, each with one key: "session"
+/// (who wrote it), "command" (what the probe was asked for) or "report" (number, at_ms and event, as `Probe.identify`
+/// gives them).
 ///
 /// Raises ProbeError where it is no log, or of another version, OSError where it cannot be read.
 #[pyfunction]
@@ -492,8 +502,8 @@ fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
     lines.collect()
 }
 
-/// A report as a dictionary. Its posterior is one probability for each texture; on the line and in a log only those are that are not
-/// negligible, with their places.
+/// A report as a dictionary. Its posterior is one probability for each texture; on the line and in a log only those are
+/// that are not negligible, with their places.
 fn reported<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyAny>> {
     let dict = object(py, report)?;
     if let Event::SlideReport { posterior, .. } = &report.event {

@@ -48,14 +48,6 @@ pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyh
     Ok(())
 }
 
-/// Prints values, each after its name.
-pub(crate) fn print_rows(rows: &[(&str, String)], out: &mut impl Write) -> anyhow::Result<()> {
-    for (name, value) in rows {
-        writeln!(out, "{name:<15} {value}")?;
-    }
-    Ok(())
-}
-
 /// Verdicts by name, as people read them, with a remark behind the share.
 pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64, String); 5] {
     let named = v.changed_right.map_or(String::new(), |share| {

@@ -164,7 +164,8 @@ pub fn explore(
     })?;
     let commands = talk.board().rig().sensor_commands();
     let status = talk.run(Request::status(), TIMEOUT_S, &mut each)?;
-    let lost_reports = talk.session().damaged() + talk.session().missing();
+    let (damaged, missing) = talk.losses();
+    let lost_reports = damaged + missing;
     let board = talk.board();
     let commands = (commands, board.rig().sensor_commands());
     let played = board.rig().world().played();

@@ -1,11 +1,14 @@
-//! A host in the same process: [`tactus_link`] over the emulated board's USART3, by virtual time.
+//! A host in the same process: a [`Probe`] of [`tactus_link`] over the emulated board's USART3, by virtual time.
 
-use std::task::Poll;
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+use std::time::Duration;
 
 use tactus_core::rig::Fault;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Phase, Report, Reset};
-use tactus_link::{Job, LinkError, PushTable, Request, Session, Transaction};
+use tactus_link::log::Line;
+use tactus_link::{LinkError, OperationError, PortError, Probe, PushTable, Request, Transaction};
 
 use crate::board::{Emulator, Error};
 
@@ -27,9 +30,9 @@ pub enum TalkError {
     /// The firmware has restarted meanwhile.
     #[error("the firmware restarted instead of answering ({0:?})")]
     Rebooted(Reset),
-    /// The link, otherwise.
+    /// The operation, otherwise.
     #[error(transparent)]
-    Link(LinkError),
+    Operation(OperationError),
     /// The firmware does not answer any more.
     #[error(
         "no answer from the firmware in {0} virtual seconds: does this ELF speak the protocol? See its log with --log"
@@ -37,20 +40,36 @@ pub enum TalkError {
     Silent(f64),
 }
 
+impl From<OperationError> for TalkError {
+    fn from(why: OperationError) -> Self {
+        match why {
+            OperationError::Link(why)
+            | OperationError::Port {
+                why: PortError::Link(why),
+                ..
+            } => why.into(),
+            why => Self::Operation(why),
+        }
+    }
+}
+
 impl From<LinkError> for TalkError {
     fn from(why: LinkError) -> Self {
         match why {
             LinkError::Refused(why) => Self::Refused(why.to_string()),
             LinkError::Rebooted { reset, .. } => Self::Rebooted(reset),
-            why => Self::Link(why),
+            why => Self::Operation(why.into()),
         }
     }
 }
 
+/// Longer than any run: virtual seconds end what takes too long.
+const NEVER: Duration = Duration::from_secs(1 << 40);
+
 /// The host's end of the line.
 pub struct Talk {
     emulator: Emulator,
-    session: Session,
+    probe: Probe,
     step_ns: u64,
 }
 
@@ -59,7 +78,7 @@ impl Talk {
     pub fn new(emulator: Emulator) -> Self {
         Self {
             emulator,
-            session: Session::default(),
+            probe: Probe::new("the emulated board", NEVER, NEVER),
             step_ns: STEP_NS,
         }
     }
@@ -85,22 +104,35 @@ impl Talk {
         self.emulator.now_ns()
     }
 
-    /// Counts of damaged and lost data on the way from the firmware.
-    pub fn session(&self) -> &Session {
-        &self.session
+    /// The probe, for operations.
+    pub fn probe(&self) -> Probe {
+        self.probe.clone()
     }
 
-    fn bytes(&mut self) -> Result<Vec<u8>, Error> {
+    /// Frames that were damaged, and reports that were lost on the way from the firmware.
+    pub fn losses(&self) -> (u64, u64) {
+        self.probe.losses()
+    }
+
+    /// Sends what is due, runs the board to the next look, and takes in what the firmware said.
+    fn carry(&mut self) -> Result<(), Error> {
+        self.emulator.send(&self.probe.to_send());
         let until_ns = self.emulator.now_ns() + self.step_ns;
         self.emulator.run_until(until_ns)?;
         let received = self.emulator.received();
-        Ok(received.into_iter().map(|(_, byte)| byte).collect())
+        let bytes: Vec<u8> = received.into_iter().map(|(_, byte)| byte).collect();
+        let now = Duration::from_nanos(self.emulator.now_ns());
+        self.probe.carry(&bytes, now);
+        Ok(())
     }
 
-    /// Runs the board to the next look and returns the firmware's reports in it.
-    pub fn step(&mut self) -> Result<Vec<Report>, Error> {
-        let bytes = self.bytes()?;
-        Ok(self.session.receive(&bytes))
+    /// Runs the board to the next look and gives what the firmware said in it.
+    pub fn step(&mut self) -> Result<Vec<Report>, TalkError> {
+        self.carry()?;
+        let reports = self.probe.listen()?;
+        // nobody keeps a log
+        self.probe.said();
+        Ok(reports)
     }
 
     /// Runs the board until `pick` returns a value for a report; `each` gets all of them, and `None` after every look.
@@ -130,32 +162,53 @@ impl Talk {
         Err(TalkError::Silent(timeout_s))
     }
 
-    /// Runs a transaction to its end; `each` gets all reports meanwhile, and `None` after every look.
+    /// Does an operation; `each` gets all reports meanwhile, and `None` after every look.
     ///
     /// # Errors
     /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
+    pub fn operate<T>(
+        &mut self,
+        operation: impl Future<Output = Result<T, OperationError>>,
+        timeout_s: f64,
+        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+    ) -> Result<T, TalkError> {
+        let (mut operation, mut context) = (pin!(operation), Context::from_waker(Waker::noop()));
+        let until_ns = self.emulator.now_ns() + (timeout_s * 1e9) as u64;
+        let mut polled = operation.as_mut().poll(&mut context);
+        while polled.is_pending() && self.emulator.now_ns() < until_ns {
+            self.carry()?;
+            polled = operation.as_mut().poll(&mut context);
+            for line in self.probe.said() {
+                if let Line::Report(report) = line {
+                    each(&mut self.emulator, Some(&report));
+                }
+            }
+            each(&mut self.emulator, None);
+        }
+        self.probe.take_words();
+        let done = match polled {
+            Poll::Ready(done) => done.map_err(TalkError::from),
+            Poll::Pending => Err(TalkError::Silent(timeout_s)),
+        };
+        if done.is_err() {
+            // what would stop a rig that moves is up to the run
+            self.probe.to_send();
+        }
+        done
+    }
+
+    /// Runs a transaction to its end, as [`operate`](Self::operate) does.
+    ///
+    /// # Errors
+    /// See [`operate`](Self::operate).
     pub fn run<E: Transaction>(
         &mut self,
         transaction: E,
         timeout_s: f64,
-        mut each: impl FnMut(&mut Emulator, Option<&Report>),
+        each: impl FnMut(&mut Emulator, Option<&Report>),
     ) -> Result<E::Outcome, TalkError> {
-        let mut send = Vec::new();
-        let mut job = Job::begin(transaction, &mut self.session, &mut send)?;
-        let until_ns = self.emulator.now_ns() + (timeout_s * 1e9) as u64;
-        while self.emulator.now_ns() < until_ns {
-            self.emulator.send(&send);
-            send.clear();
-            let bytes = self.bytes()?;
-            let polled = job.poll(&mut self.session, &bytes, &mut send, |report| {
-                each(&mut self.emulator, Some(report));
-            });
-            each(&mut self.emulator, None);
-            if let Poll::Ready(outcome) = polled {
-                return Ok(outcome?);
-            }
-        }
-        Err(TalkError::Silent(timeout_s))
+        let probe = self.probe();
+        self.operate(probe.get(transaction), timeout_s, each)
     }
 
     /// Sends a command and waits until it is over; `each` gets all reports meanwhile.

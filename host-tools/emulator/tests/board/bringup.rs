@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
-use tactus_core::wire::{Command, Report as Told, Reset};
+use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_emulator::board::{Emulator, Options, pins};
 use tactus_emulator::host::talk::{Talk, TalkError};
 use tactus_link::Request;
 use tactus_link::bringup::judge::Finding;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Owner, Person, Probe, Report,
-    STEPS, Step, Trouble,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Operator, Person, Probe,
+    Report, STEPS, Step, Trouble,
 };
 use tactus_world::encoder::Cut;
 use tactus_world::faults::Fault;
@@ -107,7 +107,7 @@ impl Probe for Linked {
     fn ask(
         &mut self,
         command: Command,
-        each: &mut dyn FnMut(&Told),
+        each: &mut dyn FnMut(&ProbeReport),
     ) -> Result<Result<(), String>, Trouble> {
         let done = self.0.run(Request::command(command), 120.0, |_, report| {
             if let Some(report) = report {
@@ -156,7 +156,7 @@ impl Person for Onlooker {
     }
 }
 
-impl Owner for Onlooker {
+impl Operator for Onlooker {
     fn found(&mut self, _: &Step, entry: &Entry) -> Result<bool, Trouble> {
         Ok(entry.passed)
     }
@@ -325,7 +325,7 @@ impl Person for Helper<'_> {
     }
 }
 
-impl Owner for Helper<'_> {
+impl Operator for Helper<'_> {
     fn found(&mut self, _: &Step, entry: &Entry) -> Result<bool, Trouble> {
         Ok(entry.passed)
     }

@@ -196,8 +196,7 @@ impl Held {
             "{counts:?}"
         );
         assert_eq!(counts.damaged_frames, 0);
-        assert_eq!(self.talk.session().damaged(), 0);
-        assert_eq!(self.talk.session().missing(), 0);
+        assert_eq!(self.talk.losses(), (0, 0));
         let board = self.talk.board();
         assert_eq!(board.resets().unwrap(), []);
         assert_eq!(board.violations().unwrap(), []);

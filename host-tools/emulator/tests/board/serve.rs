@@ -6,8 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use tactus_core::table::Table;
-use tactus_core::wire::Status;
-use tactus_link::{LinkError, Port, PortError, ReadTable, Request};
+use tactus_link::{Port, Probe};
 
 use crate::common::elf;
 
@@ -44,19 +43,14 @@ fn the_probe_answers_on_the_tcp_port() {
     stream
         .set_read_timeout(Some(Duration::from_millis(100)))
         .unwrap();
-    let mut port = Port::new(stream, Duration::from_secs(20));
-    let status = loop {
-        match port.run(Request::status(), |_| ()) {
-            // it had its power just now
-            Err(PortError::Link(LinkError::Rebooted { .. })) => {}
-            // nor has it opened its store yet
-            Ok(Status { textures: 0, .. }) => std::thread::sleep(Duration::from_millis(100)),
-            answered => break answered.unwrap(),
-        }
-    };
+    let timeout = Duration::from_secs(20);
+    let probe = Probe::new("the board", timeout, timeout);
+    let mut port = Port::new(stream, probe.clone());
+    // it had its power just now, and opens its store first
+    let status = port.run(probe.hello()).unwrap();
     assert!(status.factory, "{status:?}");
-    let bytes = port.run(ReadTable::default(), |_| ()).unwrap();
+    let bytes = port.run(probe.table()).unwrap();
     let table = Table::read(&bytes).unwrap();
     assert_eq!((table.crc(), table.textures()), (status.table_crc, 117));
-    assert_eq!(port.session().damaged(), 0);
+    assert_eq!(probe.losses().0, 0);
 }

@@ -1,97 +1,9 @@
 //! A table's notes of samples: true if they were moved or turned between the trials that it was learned from. A slide
 //! on the same track again shows little about a texture.
 
-use tactus_core::table::{EncodeError, Table, samples_length, with_moved};
+use tactus_core::table::Table;
 
-/// The common value of all of these; `None` if one is unknown, they differ, or there is none.
-pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
-    let mut moved = moved.into_iter();
-    let first = moved.next()??;
-    moved.all(|other| other == Some(first)).then_some(first)
-}
-
-/// The table with this note of each texture, by its index, in place of its old one.
-///
-/// # Errors
-/// These bytes are no table.
-pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>, EncodeError> {
-    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    let says = |texture| table.moved(texture);
-    if (0..table.textures()).all(|texture| says(texture) == moved(texture)) {
-        return Ok(table.as_bytes().to_vec());
-    }
-    let most = table.as_bytes().len() + samples_length(table.textures().into());
-    let mut noted = vec![0; most];
-    let length = with_moved(&mut noted, &table, moved)?.as_bytes().len();
-    noted.truncate(length);
-    Ok(noted)
-}
-
-/// The treatment of a texture's sample between the trials of a training, and between those before it.
-#[derive(Debug, Default)]
-pub struct Trials {
-    answers: Vec<Option<bool>>,
-}
-
-impl Trials {
-    /// Takes the note of the next trials, or of those before this training; `None`: unknown.
-    pub fn said(&mut self, moved: Option<bool>) {
-        self.answers.push(moved);
-    }
-
-    /// The note for a trial, from 0. The first one has no question of its own: it gets the note of all others.
-    pub fn before_trial(&self, trial: usize) -> Option<bool> {
-        match trial.checked_sub(1) {
-            Some(asked) => *self.answers.get(asked)?,
-            None => self.moved(),
-        }
-    }
-
-    /// The note for the table: the common value of all trials.
-    pub fn moved(&self) -> Option<bool> {
-        of_all(self.answers.iter().copied())
-    }
-}
-
-/// The result of noting the treatment of a texture's sample.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Noting {
-    /// The table has the note already, or does not know the texture.
-    Nothing,
-    /// The table with the note, which the probe is to use.
-    Table(Vec<u8>),
-    /// It cannot be noted; the reason.
-    Impossible(&'static str),
-}
-
-/// Notes the treatment of a texture's sample in the table that a probe uses.
-///
-/// # Errors
-/// These bytes are no table.
-pub fn noting(bytes: &[u8], name: &str, moved: Option<bool>) -> Result<Noting, EncodeError> {
-    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    let Some(texture) = table.find(name).filter(|&t| table.moved(t) != moved) else {
-        return Ok(Noting::Nothing);
-    };
-    // it cannot be read without the probe's own learning, which must not become a part of it
-    if (0..table.textures()).any(|texture| table.tally(texture).itself > 0) {
-        return Ok(Noting::Impossible(
-            "the probe has learned by itself, and its table cannot be replaced without mixing that in",
-        ));
-    }
-    let noted = note(bytes, |other| match other == texture {
-        true => moved,
-        false => table.moved(other),
-    })?;
-    Ok(Noting::Table(noted))
-}
-
-/// The fewest trials of a texture at a movement of the table; `None`: the table does not know it.
-pub fn fewest(table: Table<'_>, name: &str) -> Option<u8> {
-    let texture = table.find(name)?;
-    let movements = (0..).zip(table.movements());
-    movements.map(|(m, _)| table.trials(texture, m)).min()
-}
+pub use tactus_link::samples::{Noting, Trials, fewest, note, noting, of_all};
 
 /// The table's notes of its samples, in words.
 pub fn in_words(table: Table<'_>) -> String {
@@ -134,6 +46,7 @@ pub fn advice(stayed: &[&str]) -> Option<String> {
 mod tests {
     use tactus_core::explorer::Method;
     use tactus_core::features::{Movement, Observation, Properties};
+    use tactus_core::table::samples_length;
 
     use super::*;
     use crate::eval::learn::learn;

@@ -6,11 +6,11 @@ use std::io::{self, Write};
 use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
-use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::{Event, Prompt};
 
 use crate::eval::samples;
+pub use tactus_link::say::{count, day, percent};
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.
@@ -313,32 +313,6 @@ impl<'t, W: Write> Show<'t, W> {
                 self.out,
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
             ),
-        }
-    }
-}
-
-/// A number of things: "1 movement", "3 movements".
-pub fn count(number: impl Into<u64>, thing: &str) -> String {
-    match number.into() {
-        1 => format!("1 {thing}"),
-        number => format!("{number} {thing}s"),
-    }
-}
-
-/// A share as people write it: "30 %", "99.9 %".
-pub fn percent(share: f64) -> String {
-    let percent = format!("{:.4}", share * 100.0);
-    format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
-}
-
-/// A day as messages, tables and recordings have it, in words; nothing for 0.
-pub fn day(date: u32) -> Option<String> {
-    match date {
-        0 => None,
-        RigCalibration::UNDATED => Some("not known".to_owned()),
-        _ => {
-            let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
-            Some(format!("{year}-{month:02}-{day:02}"))
         }
     }
 }

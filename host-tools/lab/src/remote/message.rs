@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use tactus_core::wire::Phase;
+use tactus_link::operations::Training;
 
+use super::operations::Wanted;
 use crate::live::{Happening, KnownTable};
 
 /// What is asked for.
@@ -40,8 +42,8 @@ pub enum Request {
     },
     /// The log of the session so far, as a file.
     Log,
-    /// Files that were [given](super::Remote::give), in this order: a session's log, recordings, or an MCAP file of either. A
-    /// session is heard as if the probe said it now.
+    /// Files that were [given](super::Remote::give), in this order: a session's log, recordings, or an MCAP file of
+    /// either. A session is heard as if the probe said it now.
     #[cfg(feature = "open")]
     Open {
         /// What they are called, with the folders that they lie in.
@@ -80,17 +82,7 @@ pub enum Work {
         name: String,
     },
     /// It learns what lies under its finger from new slides.
-    Train {
-        /// The name.
-        name: String,
-        /// Trials of each movement.
-        trials: u8,
-        /// Whether the sample is moved between trials; asked for before each of them, unless given.
-        #[serde(default)]
-        moved: Option<bool>,
-        /// For where on the sample slides begin.
-        seed: u32,
-    },
+    Train(Training),
     /// Whether what lies under its finger is this texture.
     Verify {
         /// One of its textures.
@@ -103,17 +95,7 @@ pub enum Work {
         seed: u32,
     },
     /// Slides in the project's format.
-    Record {
-        /// What lies under the finger.
-        name: String,
-        /// How many.
-        slides: u8,
-        /// Whether the sample is moved between slides; asked for after each of all movements, unless given.
-        #[serde(default)]
-        moved: Option<bool>,
-        /// For where on the sample slides begin.
-        seed: u32,
-    },
+    Record(Wanted),
     /// A texture gets another name.
     Rename {
         /// One of its textures.

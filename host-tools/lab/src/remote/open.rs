@@ -20,7 +20,8 @@ pub enum OpenError {
     Empty(String),
     /// None of what can be shown.
     #[error(
-        "{0}: neither a session's log (.jsonl, `tactus device identify --log FILE`), nor an MCAP file (`tactus convert --mcap FILE`), nor recordings: of these give the folder with its manifest.csv, or a zip file of it"
+        "{0}: neither a session's log (.jsonl, `tactus device identify --log FILE`), nor an MCAP file (`tactus \
+             convert --mcap FILE`), nor recordings: of these give the folder with its manifest.csv, or a zip file of it"
     )]
     Other(String),
     /// See [`LogError`].

@@ -152,7 +152,8 @@ impl Recorded {
         let why = match self.parts() {
             Ok(judges) => {
                 let how = format!(
-                    "Each slide is judged by a table that was not learned from it: there are {}, each without a part of the slides.\n",
+                    "Each slide is judged by a table that was not learned from it: there are {}, each without a part \
+                         of the slides.\n",
                     judges.len()
                 );
                 return (judges, how);
@@ -165,7 +166,8 @@ impl Recorded {
         match world_table() {
             Ok(table) if self.finger == FingerCode::BIOTAC && !slides.is_empty() => {
                 let how = format!(
-                    "{why} So the slides are judged with the table of the simulated world 1, which knows its 117 textures only.\n"
+                    "{why} So the slides are judged with the table of the simulated world 1, which knows its 117 \
+                         textures only.\n"
                 );
                 (vec![Judge { table, slides }], how)
             }

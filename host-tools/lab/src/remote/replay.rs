@@ -5,53 +5,59 @@ use tactus_core::wire::{Command, Event, Identify};
 
 use super::message::Frame;
 use super::verifying::{Verifying, config_of, words};
+#[cfg(feature = "open")]
 use crate::eval::show::count;
 use crate::eval::verified::{Slide, print_answer, print_slide};
 use crate::live::{Happening, ProbeMonitor};
-use tactus_link::log::{self, Line, LogError};
+#[cfg(feature = "open")]
+use tactus_link::log;
+use tactus_link::log::{Line, TableParts};
 
 /// Everything that a log says of its explorations and verifications.
 ///
 /// # Errors
 /// It is no log, or of another version.
-pub(super) fn replay(log: &[u8]) -> Result<Frame, LogError> {
-    let (mut heard, mut parts) = (Replay::default(), log::TableParts::default());
-    log::read(log, |line| match line {
-        Line::Session { port, .. } => heard.begins(&port),
-        Line::Command(command) => heard.asked(command.into_owned()),
-        Line::Report(report) => {
-            let report = report.into_owned();
-            if let Event::TablePart {
-                offset,
-                length,
-                bytes,
-            } = &report.event
-            {
-                if let Some(whole) = parts.take(*offset, *length, bytes) {
-                    heard.table(whole);
-                }
-                return;
-            }
-            heard.said(report.at_ms, report.event);
-        }
-    })?;
+#[cfg(feature = "open")]
+pub(super) fn replay(log: &[u8]) -> Result<Frame, log::LogError> {
+    let mut heard = Replay::default();
+    log::read(log, |line| heard.hear(line))?;
     Ok(heard.end())
 }
 
-/// A session that is heard again.
+/// A session by its log: one that is heard again, or one that goes on.
 #[derive(Default)]
 pub(super) struct Replay {
     monitor: ProbeMonitor,
     /// the one in use
     table: Vec<u8>,
+    parts: TableParts,
     verification: Option<(Identify, Vec<Event>)>,
     frame: Frame,
+    /// slides of a verification are shown as those of an exploration, too
+    live: bool,
 }
 
 impl Replay {
-    /// It was one at this port.
-    pub(super) fn begins(&mut self, port: &str) {
-        self.frame.said = format!("A session with the probe at {port}.\n");
+    /// A session that goes on.
+    pub(super) fn live() -> Self {
+        Self {
+            live: true,
+            ..Self::default()
+        }
+    }
+
+    /// Takes in a line of the log.
+    pub(super) fn hear(&mut self, line: Line<'_>) {
+        match line {
+            Line::Session { port, .. } => {
+                self.frame.said = format!("A session with the probe at {port}.\n");
+            }
+            Line::Command(command) => self.asked(command.into_owned()),
+            Line::Report(report) => {
+                let report = report.into_owned();
+                self.said(report.at_ms, report.event);
+            }
+        }
     }
 
     /// The table in use, as far as it is known.
@@ -63,6 +69,7 @@ impl Replay {
     pub(super) fn table(&mut self, whole: Vec<u8>) {
         self.judged();
         self.monitor.knows(&whole);
+        self.monitor.learned();
         self.take();
         let known = self.monitor.known().clone();
         self.frame.tables.push((self.frame.happened.len(), known));
@@ -90,15 +97,33 @@ impl Replay {
     /// The probe said something, so many ms since it had booted.
     pub(super) fn said(&mut self, at_ms: u32, event: Event) {
         self.frame.at_ms = at_ms;
+        if let Event::TablePart {
+            offset,
+            length,
+            bytes,
+        } = &event
+        {
+            if let Some(whole) = self.parts.take(*offset, *length, bytes) {
+                self.table(whole);
+            }
+            return;
+        }
         let Some((_, events)) = &mut self.verification else {
             self.monitor.hear(event);
             return;
         };
+        if self.live {
+            self.monitor.hear(event.clone());
+        }
         match event {
             Event::Done(_) => self.judged(),
             Event::Rejected { .. } | Event::Refused { .. } | Event::Trouble(_) => {
-                self.monitor.hear(event);
+                if !self.live {
+                    self.monitor.hear(event);
+                }
             }
+            // samples judge nothing
+            Event::Block(_) => {}
             event => {
                 let judges = matches!(event, Event::Verified { .. });
                 events.push(event);
@@ -117,7 +142,8 @@ impl Replay {
         }
     }
 
-    /// It said why something came to nothing.
+    /// It said why something failed.
+    #[cfg(feature = "open")]
     pub(super) fn refused(&mut self, at_ms: u32, why: &str) {
         self.frame.at_ms = at_ms;
         self.monitor.happens(Happening::Refused {
@@ -160,7 +186,18 @@ impl Replay {
         self.frame.happened.extend(heard.happened);
     }
 
+    /// Everything since the last time.
+    pub(super) fn frame(&mut self) -> Frame {
+        self.take();
+        let next = Frame {
+            at_ms: self.frame.at_ms,
+            ..Frame::default()
+        };
+        std::mem::replace(&mut self.frame, next)
+    }
+
     /// All of it.
+    #[cfg(feature = "open")]
     pub(super) fn end(mut self) -> Frame {
         self.judged();
         self.take();

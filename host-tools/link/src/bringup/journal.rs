@@ -1,4 +1,5 @@
-//! What was found so far, a line of JSON for each step that is over, so that the next evening goes on where this one ended.
+//! What was found so far, a line of JSON for each step that is over, so that the next evening goes on where this one
+//! ended.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
@@ -6,7 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::found::{Found, Series};
+use super::result::{Series, StepResult};
 use super::steps::Step;
 
 /// A step that is over.
@@ -51,7 +52,7 @@ pub struct EntrySeries {
 
 impl Entry {
     /// What a step found at a time.
-    pub fn new(step: &Step, at: String, found: &Found) -> Self {
+    pub fn new(step: &Step, at: String, found: &StepResult) -> Self {
         let mistakes = found.finding.named.iter().map(|named| {
             let place = match named.place {
                 "" => String::new(),

@@ -1,5 +1,5 @@
-//! What measurements of a new rig mean: limits, and which mistake shows like this. Pure functions of what the board and the person
-//! at it said.
+//! What measurements of a new rig mean: limits, and which mistake shows like this. Pure functions of what the board and
+//! the person at it said.
 
 pub mod mounted;
 
@@ -486,8 +486,8 @@ pub fn line(points: &[[f64; 2]]) -> Option<(f64, f64)> {
     (square > 0.0).then(|| (both / square, y - both / square * x))
 }
 
-/// The amplifier's gain by a resistor of so many ohm at so many V in the place of the stage's motor: duties, thousandths, and
-/// currents, mA.
+/// The amplifier's gain by a resistor of so many ohm at so many V in the place of the stage's motor: duties,
+/// thousandths, and currents, mA.
 pub fn resistor(
     done: Result<(), Stopped>,
     points: &[[f64; 2]],

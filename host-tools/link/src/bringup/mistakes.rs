@@ -30,7 +30,8 @@ macro_rules! mistakes {
 
 mistakes! {
     SUPPLY = "supply": "a supply is not what it should be",
-        "Measure it again at the pin that is named, everything connected; replace the supply or find what pulls it down";
+        "Measure it again at the pin that is named, everything connected; replace the supply or find what pulls it \
+             down";
     RESET = "reset": "the firmware gave up before",
         "Report the last words; power the board off and on, and begin again";
     CLOCK = "clock": "the 8 MHz of the ST-LINK are not there, or the core does not run by them",
@@ -48,7 +49,8 @@ mistakes! {
     DATA_EXCHANGED = "data-exchanged": "the sensor's MISO and MOSI are exchanged",
         "The sensor's output belongs to PA6, its input to PB5";
     SENSOR_SILENT = "sensor-silent": "no sensor answers",
-        "Its supply of 3.3 V and ground, chip select PD14, clock PA5, its output at PA6; measure each at the sensor's end of the cable";
+        "Its supply of 3.3 V and ground, chip select PD14, clock PA5, its output at PA6; measure each at the \
+             sensor's end of the cable";
     MISO_STUCK = "miso-stuck": "MISO is tied to a level",
         "Look for a short of PA6 to ground or to 3.3 V in cable and plug";
     PULL_MISSING = "pull-missing": "a resistor is missing that holds a pin while the chip is in reset",
@@ -112,15 +114,18 @@ mistakes! {
     CURRENT_GAIN = "current-gain": "the amplifier of the motor's current has another gain than 1 V/A",
         "INA240A1 (20 V/V) and a shunt of 50 mohm; A2 has 50 V/V, A3 100, A4 200";
     SCALE_LINE = "scale-line": "P_DC and the weights are on no line",
-        "Each weight rests on the tip alone and stands still, the finger held so that it does not give way; weigh again";
+        "Each weight rests on the tip alone and stands still, the finger held so that it does not give way; weigh \
+             again";
     SCALE_FAR = "scale-far": "a count of P_DC is worth another force than a finger's can be",
-        "5.75 to 23 mN a count are possible: see whether the weights are g; else the finger's filling or its amplifier is wrong";
+        "5.75 to 23 mN a count are possible: see whether the weights are g; else the finger's filling or its \
+             amplifier is wrong";
     FINGER_LEAKS = "finger-leaks": "P_DC falls under a weight that stands, or does not come back after it",
         "Wait a minute and weigh again; if it stays so, look for fluid at the skin's rim and refill the finger";
     ZERO_DRIFTS = "zero-drifts": "P_DC in the air is not the same twice",
         "A finger warms up for a quarter of an hour; keep the sun off it; if it stays so the skin leaks";
     STAGE_SPEED = "stage-speed": "the stage does not keep the speed that it is asked for",
-        "Oil and align its screw, look for what drags on it or its cables, and whether the bridge's supply holds 12 V meanwhile";
+        "Oil and align its screw, look for what drags on it or its cables, and whether the bridge's supply holds 12 \
+             V meanwhile";
     SAMPLES_LOST = "samples-lost": "the firmware lost samples",
         "Report it, with the log (tactus device status --log FILE)";
     SLIDE_QUIET = "slide-quiet": "the finger hears nothing of the slide",

@@ -4,8 +4,8 @@ use tactus_core::explorer::Strategy;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Identify, Live, Phase, Report};
 
-use super::found::{Found, Series};
 use super::judge::mounted::{self as judge, SlideSeen};
+use super::result::{Series, StepResult};
 use super::seams::{Person, Probe, Trouble};
 use super::weights;
 
@@ -52,7 +52,7 @@ impl Mounted<'_> {
     }
 
     /// P_DC in the air, twice; then the force scale that was weighed is kept.
-    pub(super) fn zero(&mut self) -> Result<Found, Trouble> {
+    pub(super) fn zero(&mut self) -> Result<StepResult, Trouble> {
         self.person.done(
             "Put the finger on its mount and computer paper under it, on the stage; nothing else is near",
         )?;
@@ -87,7 +87,7 @@ impl Mounted<'_> {
     }
 
     /// The stage's speed, with the finger in the air.
-    pub(super) fn speed(&mut self) -> Result<Found, Trouble> {
+    pub(super) fn speed(&mut self) -> Result<StepResult, Trouble> {
         let mut places: Vec<(u32, Live)> = Vec::new();
         let mut unloaded = false;
         let done = self
@@ -102,7 +102,7 @@ impl Mounted<'_> {
             let seconds = f64::from(at_ms.wrapping_sub(first_ms)) * 1e-3;
             [seconds, f64::from(live.speed_um_s) * 1e-3]
         });
-        Ok(Found {
+        Ok(StepResult {
             series: Some(Series {
                 title: "speed of the stage by its encoder, the finger in the air",
                 axes: ["s", "mm/s"],
@@ -113,9 +113,10 @@ impl Mounted<'_> {
     }
 
     /// The first slide.
-    pub(super) fn slide(&mut self) -> Result<Found, Trouble> {
+    pub(super) fn slide(&mut self) -> Result<StepResult, Trouble> {
         self.person
-            .watch("The finger comes down and slides over the paper once. Press the emergency stop if it does anything else.")?;
+            .watch("The finger comes down and slides over the paper once. Press the emergency stop if it does \
+                 anything else.")?;
         let mut seen = SlideSeen::default();
         let mut first_ms = None;
         let one = Identify {
@@ -152,7 +153,7 @@ impl Mounted<'_> {
             Ok(counts) => seen.counts = counts,
             Err(why) => seen.failed = Some(why),
         }
-        Ok(Found {
+        Ok(StepResult {
             finding: judge::slide(&seen),
             series: Some(Series {
                 title: "force by P_DC during the first slide",

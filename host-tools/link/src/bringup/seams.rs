@@ -13,12 +13,14 @@ pub enum Trouble {
     Quit,
     /// Another image runs.
     #[error(
-        "another image runs on the board: flash the self-test (cargo xtask flash --self-test, or `tactus device flash`), then the same command again"
+        "another image runs on the board: flash the self-test (cargo xtask flash --self-test, or `tactus device \
+             flash`), then the same command again"
     )]
     OtherImage,
     /// The board says nothing.
     #[error(
-        "the self-test says nothing: flash it (cargo xtask flash --self-test), press the board's black button, then the same command again"
+        "the self-test says nothing: flash it (cargo xtask flash --self-test), press the board's black button, then \
+             the same command again"
     )]
     Silent,
     /// An answer to another question, or one of another version.
@@ -37,7 +39,8 @@ pub trait Board {
     /// See [`Trouble`].
     fn ask(&mut self, measure: Measure) -> Result<Saw, Trouble>;
 
-    /// Asks for something that ends with a new start of the board, and waits for that: why it started; `None` if it does not.
+    /// Asks for something that ends with a new start of the board, and waits for that: why it started; `None` if it
+    /// does not.
     ///
     /// # Errors
     /// See [`Trouble`].
@@ -46,8 +49,8 @@ pub trait Board {
 
 /// The rig's firmware at the other end of a line.
 pub trait Probe {
-    /// Asks for something, and waits until it is over; `each` gets all that is said meanwhile. Within: why it was refused or
-    /// came to nothing.
+    /// Asks for something, and waits until it is over; `each` gets all that is said meanwhile. Within: why it was
+    /// refused or came to nothing.
     ///
     /// # Errors
     /// See [`Trouble`].

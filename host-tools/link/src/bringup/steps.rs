@@ -5,13 +5,13 @@ use tactus_core::wire::bringup::{
     Look, MAX_POINTS, Measure, POINTS, Pin, Saw, SensorSeen, Stopped, limits,
 };
 
-use super::found::{Found, Series};
 use super::judge::mounted::{AIR_COUNTS, OFF_LINE, SPEED_SHARE, UNEVEN_MM};
 use super::judge::{
     self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
     TRAVEL_MM, Went,
 };
 use super::mounted::Mounted;
+use super::result::{Series, StepResult};
 use super::seams::{Board, Person, Trouble};
 
 /// A step.
@@ -29,8 +29,8 @@ pub struct Step {
 
 /// What is done, and the image that it takes.
 pub(super) enum Run {
-    SelfTest(fn(&mut Bench<'_>) -> Result<Found, Trouble>),
-    Rig(fn(&mut Mounted<'_>) -> Result<Found, Trouble>),
+    SelfTest(fn(&mut Bench<'_>) -> Result<StepResult, Trouble>),
+    Rig(fn(&mut Mounted<'_>) -> Result<StepResult, Trouble>),
 }
 
 impl Step {
@@ -123,7 +123,8 @@ pub static STEPS: &[Step] = &[
         checks: "pins that float or are tied",
         how: "the board pulls each pin up and down",
         limit: || {
-            "switches not high; encoder driven; MISO and not MOSI driven by the selected sensor; PD14 high, PE13 and PC8 low by their resistors".to_owned()
+            "switches not high; encoder driven; MISO and not MOSI driven by the selected sensor; PD14 high, PE13 and \
+                 PC8 low by their resistors".to_owned()
         },
         run: Run::SelfTest(|bench| {
             // the pins are looked at when the board starts, before their drivers have them
@@ -158,7 +159,7 @@ pub static STEPS: &[Step] = &[
                 .iter()
                 .zip(0..)
                 .map(|(point, at)| [f64::from(at) / 2.2, point[0]]);
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::noise(&seen),
                 series: Some(Series {
                     title: "P_AC of the finger that nobody touches",
@@ -175,7 +176,8 @@ pub static STEPS: &[Step] = &[
         limit: || "closed, open while it is pressed, and no other one with it".to_owned(),
         run: Run::SelfTest(|bench| {
             bench.person.done(
-                "Push the stage to its middle by hand; turn the lever's knob until its switch is free; release the emergency stop",
+                "Push the stage to its middle by hand; turn the lever's knob until its switch is free; release the \
+                     emergency stop",
             )?;
             let mut looks = Vec::new();
             for pin in SWITCHES {
@@ -278,7 +280,7 @@ pub static STEPS: &[Step] = &[
             let mut points = bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?;
             let back = bench.lever(Measure::LeverTop)?;
             points.extend(bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?);
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::lever_switch(&up, &down, &back),
                 series: Some(Series {
                     title: "P_DC above its rest while the lever goes 2 mm down and up, the finger off",
@@ -350,7 +352,7 @@ pub static STEPS: &[Step] = &[
             let right = ask_stage(bench, true)?;
             let points = bench.points(1e-3, 1.0)?;
             let left = ask_stage(bench, false)?;
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::bridge(&right, &left),
                 series: Some(Series {
                     title: "the motor's current while the stage goes to the right",
@@ -366,7 +368,11 @@ pub static STEPS: &[Step] = &[
         how: "a resistor of 22 ohm, 5 W, in the place of the stage's motor; duties to 0.48 on both sides",
         limit: || range(GAIN, "V/A"),
         run: Run::SelfTest(|bench| {
-            let ohm = bench.person.number("Take the wires of the stage's motor off the bridge, put a resistor of some 22 ohm and 5 W there, and measure it", "ohm")?;
+            let ohm = bench.person.number(
+                "Take the wires of the stage's motor off the bridge, put a resistor of \
+                 some 22 ohm and 5 W there, and measure it",
+                "ohm",
+            )?;
             let supply_v = bench
                 .person
                 .number("Measure the supply of the bridge", "V")?;
@@ -384,7 +390,7 @@ pub static STEPS: &[Step] = &[
             for point in &mut points {
                 point[0] *= 1e-3;
             }
-            Ok(Found {
+            Ok(StepResult {
                 finding,
                 series: Some(Series {
                     title: "current of the resistor by the bridge's duty",
@@ -424,7 +430,10 @@ pub static STEPS: &[Step] = &[
             )
         },
         run: Run::SelfTest(|bench| {
-            bench.person.done("Lay the finger down with its tip up, in something that holds it, and let nothing touch the tip")?;
+            bench.person.done(
+                "Lay the finger down with its tip up, in something that holds it, and let nothing \
+                 touch the tip",
+            )?;
             let [air, _] = bench.sensor()?.pdc;
             let mut points = Vec::new();
             for grams in WEIGHTS_G {
@@ -442,7 +451,7 @@ pub static STEPS: &[Step] = &[
             let [last, _] = bench.sensor()?.pdc;
             bench.person.done("Take the weight away")?;
             let [after, _] = bench.sensor()?.pdc;
-            Ok(Found {
+            Ok(StepResult {
                 finding: judge::mounted::scale(&points, last - first, after - air),
                 series: Some(Series {
                     title: SCALE,

@@ -15,8 +15,8 @@ pub enum WeightError {
     Falls,
 }
 
-/// The line through counts and weights in mN, and through 0 and 0, where the finger is in the air: mN a count, and how far each
-/// weight is off it, mN.
+/// The line through counts and weights in mN, and through 0 and 0, where the finger is in the air: mN a count, and how
+/// far each weight is off it, mN.
 ///
 /// # Errors
 /// See [`WeightError`].

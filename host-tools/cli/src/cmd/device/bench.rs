@@ -1,75 +1,64 @@
-//! A probe that somebody works with: its line, the log of what is said, and Ctrl-C, which leaves the rig lifted and stopped.
+//! A probe that somebody works with at a terminal: its line, the log of what is said, questions, and Ctrl-C, which
+//! leaves the rig lifted
+//! and stopped.
 
 use std::io::{self, Write};
-use std::ops::ControlFlow;
+use std::pin::{Pin, pin};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::task::Poll;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use tactus_core::table::{Table, TableError};
-use tactus_core::wire::{Command, Event, Report, Status};
-pub(crate) use tactus_lab::remote::say::Prompts;
-use tactus_lab::remote::say::after;
+use tactus_core::wire::{Event, Report, Status};
 use tactus_link::bringup::Trouble;
-use tactus_link::exchange::{BOOTING, GREETING, TIMEOUT, is_up};
-use tactus_link::lifting::{Lifting, RigHeard, Stopped as Rig, moves};
+use tactus_link::lifting::Stopped;
 use tactus_link::line::Line;
-use tactus_link::owner::Owner;
-use tactus_link::{Job, LinkError, Port, PortError, ReadTable, Request, Transaction};
+use tactus_link::lock::PortLock;
+use tactus_link::log;
+use tactus_link::person::{Question, QuestionKind};
+use tactus_link::probe::{GREETING, TIMEOUT};
+use tactus_link::{OperationError, Port, Probe, Transaction};
 
 use super::history::History;
 use super::line::{Emulator, OpenError, Where};
 use super::log::Log;
+use super::loss::{Consent, can_be_asked};
+use crate::cmd::output::Format;
 
 /// An emulated board may go slower than real time.
 const EMULATED: Duration = Duration::from_secs(30);
 
-/// What went wrong at the bench, and what to do.
+/// An error at the bench, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BenchError {
     /// There is no line.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The line, or what the probe said.
-    #[error("{name}: {why}{}", after(.why, *.moving))]
-    Port {
-        name: String,
-        why: PortError,
-        /// Something that moves was asked for and not over.
-        moving: bool,
-    },
-    /// Ctrl-C.
-    #[error("{}", Rig::Lifted)]
-    Stopped,
-    /// Ctrl-C, and the fault is that the lever does not find its top.
-    #[error("{}", Rig::NotHome)]
-    NotHome,
-    /// Ctrl-C twice, or the probe did not answer.
-    #[error("{}", Rig::NotLifted)]
-    NotLifted,
-    /// The probe holds a table that is none.
-    #[error("the probe's table cannot be read: {0}")]
-    Table(#[from] TableError),
+    /// An operation failed, or was stopped.
+    #[error(transparent)]
+    Operation(#[from] OperationError),
     /// The log cannot be written.
     #[error("{0}; the rig was stopped and lifted")]
     Log(io::Error),
-    /// A bring-up came to no end.
+    /// A bring-up did not reach its end.
     #[error(transparent)]
     BringUp(#[from] Trouble),
     /// There can be no log, or what is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// Nobody can be asked.
+    #[error("nothing was changed: there is nobody to ask; add --yes to do it")]
+    Nobody,
 }
 
 impl BenchError {
-    /// Whether the user had it stopped: what a shell takes for Ctrl-C.
+    /// Returns true where the user had it stopped: what a shell takes for Ctrl-C.
     pub(crate) fn is_interrupt(&self) -> bool {
         matches!(
             self,
-            Self::Stopped | Self::NotHome | Self::NotLifted | Self::BringUp(Trouble::Quit)
+            Self::Operation(OperationError::Stopped(_)) | Self::BringUp(Trouble::Quit)
         )
     }
 }
@@ -93,7 +82,7 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Whether there was one since this was asked last.
+    /// Returns true where there was one since the last time.
     pub(crate) fn take(&self) -> bool {
         self.0.swap(false, Relaxed)
     }
@@ -102,56 +91,25 @@ impl Interrupt {
 /// A probe that somebody works with.
 pub(crate) struct Bench {
     port: Port<Box<dyn Line>>,
+    probe: Probe,
     pub(crate) name: String,
     interrupt: Interrupt,
-    heard: Heard,
-    /// ends last
-    _emulator: Option<Emulator>,
-    _owner: Option<Owner>,
-}
-
-/// What the reports have said of the rig, and the log that keeps them.
-struct Heard {
     log: Option<Log>,
     history: History,
-    rig: RigHeard,
-    began: Instant,
-}
-
-impl Heard {
-    fn hear(&mut self, report: &Report) {
-        if let Some(log) = &mut self.log {
-            log.told(report);
-        }
-        self.history.hear(report);
-        self.rig.hear(report, self.began.elapsed());
-        if let Event::Chosen {
-            slide, movement, ..
-        } = &report.event
-        {
-            tracing::info!(slide, %movement, "the probe chooses");
-        }
-    }
-
-    fn asked(&mut self, command: &Command) {
-        if let Some(log) = &mut self.log {
-            log.asked(command);
-        }
-    }
-
-    /// That all of it is in the log.
-    fn logged(&mut self) -> Result<(), BenchError> {
-        let Some(Err(why)) = self.log.as_mut().map(Log::flush) else {
-            return Ok(());
-        };
-        self.log = None;
-        Err(BenchError::Log(why))
-    }
+    format: Format,
+    consent: Consent,
+    /// the file that the probe's table was kept in
+    backup: Option<String>,
+    /// what failed here while an operation is being stopped
+    failed: Option<BenchError>,
+    /// ends last
+    _emulator: Option<Emulator>,
+    _lock: Option<PortLock>,
 }
 
 impl Bench {
     /// Opens the line and waits until the probe has its table: it may have had its power just now.
-    pub(crate) fn open(place: &Where) -> Result<(Self, Status), BenchError> {
+    pub(crate) fn open(place: &Where, format: Format) -> Result<(Self, Status), BenchError> {
         let interrupt = Interrupt::catch()?;
         let open = place.open()?;
         let log = place.log.as_ref().map(|path| Log::create(path, &open.name));
@@ -159,240 +117,211 @@ impl Bench {
             Some(_) => (EMULATED, EMULATED),
             None => (GREETING, TIMEOUT),
         };
+        let probe = Probe::new(&open.name, greeting, timeout);
         let mut bench = Self {
-            port: Port::new(open.line, greeting),
+            port: Port::new(open.line, probe.clone()),
+            probe: probe.clone(),
             interrupt,
-            heard: Heard {
-                log: log.transpose()?,
-                history: History::of(&open.name),
-                rig: RigHeard::default(),
-                began: Instant::now(),
-            },
+            log: log.transpose()?,
+            history: History::of(&open.name),
+            format,
+            consent: Consent::default(),
+            backup: None,
+            failed: None,
             name: open.name,
             _emulator: open.emulator,
-            _owner: open.owner,
+            _lock: open.lock,
         };
-        let status = bench.hello()?;
-        bench.port.set_timeout(timeout);
+        let status = bench.done(probe.hello(), &mut io::sink())?;
         Ok((bench, status))
     }
 
-    /// The status of a probe that has come up.
-    fn hello(&mut self) -> Result<Status, BenchError> {
-        let began = Instant::now();
-        loop {
-            let status = self.get(Request::status());
-            let is_up = match &status {
-                Ok(status) => is_up(status),
-                Err(BenchError::Port { why, .. }) => !why.is_restart(),
-                Err(_) => true,
-            };
-            if is_up || began.elapsed() > BOOTING {
-                return status;
-            }
-            std::thread::sleep(Duration::from_millis(100));
-        }
+    /// The probe, for operations.
+    pub(crate) fn probe(&self) -> Probe {
+        self.probe.clone()
     }
 
-    /// What was damaged and lost on the line: frames, reports.
+    /// From now on something may be taken from the probe like this.
+    pub(crate) fn consents(&mut self, consent: &Consent) {
+        self.consent = consent.clone();
+    }
+
+    /// The file that the probe's table was kept in before something was lost.
+    pub(crate) fn backup(&self) -> Option<String> {
+        self.backup.clone()
+    }
+
+    /// Frames that were damaged, and reports that were lost on the line.
     pub(crate) fn losses(&self) -> (u64, u64) {
-        let session = self.port.session();
-        (session.damaged(), session.missing())
+        self.probe.losses()
     }
 
-    /// What this PC remembers of the probe.
+    /// The memory of this PC of the probe.
     pub(crate) fn history(&self) -> &History {
-        &self.heard.history
+        &self.history
     }
 
-    /// Whether the user wants to end.
+    /// Ctrl-C, for those who wait for something else than the probe.
     pub(crate) fn interrupt(&self) -> &Interrupt {
         &self.interrupt
     }
 
-    /// Runs a transaction to its end; `each` gets every report. Whatever ends it early leaves the rig stopped and lifted.
-    pub(crate) fn run<E: Transaction>(
+    /// Does an operation, and prints its words where they are for people. Whatever ends it early leaves the rig stopped
+    /// and lifted.
+    pub(crate) fn done<T>(
         &mut self,
-        transaction: E,
-        mut each: impl FnMut(&Report) -> io::Result<()>,
-    ) -> Result<E::Outcome, BenchError> {
-        let each = |report: &Report| each(report).map(|()| ControlFlow::Continue(()));
-        let outcome = self.run_until(transaction, each)?;
-        // nothing but the user stops it
-        outcome.ok_or(BenchError::Stopped)
-    }
-
-    /// As [`run`](Self::run), and `each` may break it off: `None` then, and the rig is stopped and lifted.
-    pub(crate) fn run_until<E: Transaction>(
-        &mut self,
-        transaction: E,
-        mut each: impl FnMut(&Report) -> io::Result<ControlFlow<()>>,
-    ) -> Result<Option<E::Outcome>, BenchError> {
-        let mut job = self.begin(transaction)?;
-        let mut goes_on = ControlFlow::Continue(());
+        operation: impl Future<Output = Result<T, OperationError>>,
+        out: &mut dyn Write,
+    ) -> Result<T, BenchError> {
+        let mut operation = pin!(operation);
         loop {
-            let mut shown = Ok(());
-            let polled = self.step(&mut job, |report| {
-                if shown.is_ok() {
-                    match each(report) {
-                        Ok(ControlFlow::Continue(())) => {}
-                        Ok(enough) => goes_on = enough,
-                        Err(why) => shown = Err(why),
-                    }
-                }
-            });
-            match (polled, shown) {
-                (Ok(Poll::Ready(outcome)), Ok(())) => return Ok(Some(outcome)),
-                (Ok(Poll::Pending), Ok(())) if goes_on.is_break() => {
-                    return match self.lift() {
-                        BenchError::Stopped => Ok(None),
-                        why => Err(why),
-                    };
-                }
-                (Ok(Poll::Pending), Ok(())) if !self.interrupt.take() => {}
-                (Ok(Poll::Pending), Ok(())) => {
-                    eprintln!("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");
-                    return Err(self.lift());
-                }
-                (Ok(_), Err(why)) => {
-                    // what could not be shown goes before what came of stopping
-                    self.lift();
-                    return Err(why.into());
-                }
-                (Err(why @ BenchError::Log(_)), _) => {
-                    self.lift();
-                    return Err(why);
-                }
-                (Err(why), _) => return Err(why),
+            if let Poll::Ready(done) = self.poll(operation.as_mut(), out, &mut |_| ()) {
+                return done;
+            }
+            if self.interrupt.take() {
+                eprintln!("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");
+                self.probe.interrupt();
             }
         }
     }
 
-    /// As [`run`](Self::run), for what comes of it alone.
-    pub(crate) fn get<E: Transaction>(&mut self, transaction: E) -> Result<E::Outcome, BenchError> {
-        self.run(transaction, |_| Ok(()))
-    }
-
-    /// As [`run`](Self::run), for commands that move the rig: prints what a person is asked to do, and a fault and its recovery.
-    pub(crate) fn perform<E: Transaction>(
+    /// Polls an operation once, and does what it needs meanwhile; `each` gets the reports that came.
+    pub(crate) fn poll<T, F>(
         &mut self,
-        transaction: E,
-        out: &mut impl Write,
-    ) -> Result<E::Outcome, BenchError> {
-        let mut prompts = Prompts::default();
-        self.run(transaction, |report| prompts.show(report, out))
-    }
-
-    /// Begins a transaction; the caller may do something else between its [steps](Bench::step).
-    pub(crate) fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, BenchError> {
-        let begun = self.port.begin(transaction);
-        let job = begun.map_err(|why| self.error(why, false))?;
-        if let Some(command) = job.command() {
-            self.heard.asked(command);
+        operation: Pin<&mut F>,
+        out: &mut dyn Write,
+        each: &mut dyn FnMut(&Report),
+    ) -> Poll<Result<T, BenchError>>
+    where
+        F: Future<Output = Result<T, OperationError>> + ?Sized,
+    {
+        let polled = self.port.poll(operation);
+        self.keep_log(each);
+        let words = self.probe.take_words();
+        if self.format == Format::Text && !words.is_empty() {
+            let shown = out.write_all(&words).and_then(|()| out.flush());
+            shown.unwrap_or_else(|why| self.fails(why.into()));
         }
-        Ok(job)
-    }
-
-    /// Continues a transaction: reads once.
-    ///
-    /// # Errors
-    /// See [`BenchError`]. A rig that moves gets a stop command, in case the probe still hears it.
-    pub(crate) fn step<E: Transaction>(
-        &mut self,
-        job: &mut Job<E>,
-        mut each: impl FnMut(&Report),
-    ) -> Result<Poll<E::Outcome>, BenchError> {
-        let moving = job.command().is_some_and(moves);
-        if moving {
-            self.heard.rig.moves(job.last_id());
+        if let Some(backup) = self.probe.backup() {
+            let kept = self.consent.keep(&backup.name, &backup.bytes);
+            let kept = kept.inspect(|file| self.backup = Some(file.clone()));
+            self.probe.kept(
+                kept.map(|file| format!("`tactus device table push {file}` brings it back.")),
+            );
         }
-        let polled = self.port.step(job, |report| {
-            self.heard.hear(report);
-            each(report);
-        });
-        self.heard.logged()?;
-        polled.map_err(|why| {
-            if moving && !matches!(why, PortError::Link(LinkError::Refused(_))) {
-                // there may be nobody to hear it
-                let _ = self.port.send(Command::Stop);
-                let _ = self.port.listen(|_| ());
+        if let Some(question) = self.probe.question() {
+            match self.ask(&question, out) {
+                Ok(Some(yes)) => self.probe.answer(yes),
+                Ok(None) => self.probe.stop(),
+                Err(why) => self.fails(why),
             }
-            self.error(why, moving)
+        }
+        let Poll::Ready(done) = polled else {
+            return Poll::Pending;
+        };
+        Poll::Ready(match self.failed.take() {
+            Some(why) => Err(why),
+            None => Ok(done?),
         })
     }
 
-    /// Sends a command beside the transaction under way.
-    pub(crate) fn send(&mut self, command: Command) -> Result<(), BenchError> {
-        self.heard.asked(&command);
-        let asked = self.port.send(command);
-        asked.map_err(|why| self.error(why, false))
+    /// Nothing more can be done; the rig is stopped and lifted first.
+    fn fails(&mut self, why: BenchError) {
+        self.failed.get_or_insert(why);
+        self.probe.stop();
     }
 
-    /// Reads once, while no transaction is under way.
-    pub(crate) fn listen(&mut self, mut each: impl FnMut(&Report)) -> Result<(), BenchError> {
-        let listened = self.port.listen(|report| {
-            self.heard.hear(report);
+    fn keep_log(&mut self, each: &mut dyn FnMut(&Report)) {
+        for line in self.probe.said() {
+            if let Some(log) = &mut self.log {
+                log.line(&line);
+            }
+            let log::Line::Report(report) = &line else {
+                continue;
+            };
+            self.history.hear(report);
+            if let Event::Chosen {
+                slide, movement, ..
+            } = &report.event
+            {
+                tracing::info!(slide, %movement, "the probe chooses");
+            }
             each(report);
-        });
-        self.heard.logged()?;
-        listened.map_err(|why| self.error(why, false))
-    }
-
-    /// The table that the probe uses; all of it is in the log then.
-    pub(crate) fn table(&mut self) -> Result<Vec<u8>, BenchError> {
-        self.get(ReadTable::default())
-    }
-
-    /// The names of the textures that the probe knows.
-    pub(crate) fn names(&mut self) -> Result<Vec<String>, BenchError> {
-        let bytes = self.table()?;
-        Ok(Table::read(&bytes)?.names().map(str::to_owned).collect())
-    }
-
-    /// Stops whatever is done and waits until the finger is lifted and nothing moves: what came of it. A second Ctrl-C ends
-    /// the waiting.
-    pub(crate) fn lift(&mut self) -> BenchError {
-        match self.try_lift() {
-            Ok(Rig::Lifted) => BenchError::Stopped,
-            Ok(Rig::NotHome) => BenchError::NotHome,
-            Ok(Rig::NotLifted) => BenchError::NotLifted,
-            Err(why) => why,
+        }
+        if let Some(Err(why)) = self.log.as_mut().map(Log::flush) {
+            self.log = None;
+            self.fails(BenchError::Log(why));
         }
     }
 
-    fn try_lift(&mut self) -> Result<Rig, BenchError> {
-        let began = self.heard.began;
-        let mut lifting = Lifting::begin(&mut self.heard.rig, began.elapsed());
-        loop {
-            if self.interrupt.take() {
-                return Ok(Rig::NotLifted);
+    /// Asks who sits at the terminal; `None` is Ctrl-C or the end of the input.
+    fn ask(&self, question: &Question, out: &mut dyn Write) -> Result<Option<bool>, BenchError> {
+        let Question { said, asked, kind } = question;
+        let prompt = match kind {
+            QuestionKind::Consent => {
+                match self.format {
+                    Format::Text => writeln!(out, "{said}")?,
+                    Format::Json => eprintln!("{said}"),
+                }
+                out.flush()?;
+                if self.consent.yes {
+                    return Ok(Some(true));
+                }
+                can_be_asked(false)?;
+                format!("{asked} [y/N] ")
             }
-            for command in lifting.asks(began.elapsed()).into_iter().flatten() {
-                self.send(command)?;
+            QuestionKind::Moved => format!("{asked}, then press Enter (n: it stays): "),
+            QuestionKind::Laid => format!("{asked} and press Enter: "),
+            QuestionKind::LaidOrLeftOut => {
+                format!("{asked} and press Enter, or s to leave it out: ")
             }
-            self.listen(|_| ())?;
-            if let Some(came) = lifting.came(&self.heard.rig, began.elapsed()) {
-                return Ok(came);
+        };
+        let answer = read_answer(&self.interrupt, &prompt)?;
+        Ok(answer.map(|answer| {
+            let answer = answer.trim().to_lowercase();
+            match kind {
+                QuestionKind::Consent => matches!(&answer[..], "y" | "yes"),
+                QuestionKind::Moved => !matches!(&answer[..], "n" | "no" | "s"),
+                QuestionKind::Laid => true,
+                QuestionKind::LaidOrLeftOut => answer != "s",
             }
+        }))
+    }
+
+    /// Does one request.
+    pub(crate) fn get<E: Transaction>(&mut self, transaction: E) -> Result<E::Outcome, BenchError> {
+        let probe = self.probe();
+        self.done(probe.get(transaction), &mut io::sink())
+    }
+
+    /// The table that the probe uses.
+    pub(crate) fn table(&mut self) -> Result<Arc<[u8]>, BenchError> {
+        let probe = self.probe();
+        self.done(probe.table(), &mut io::sink())
+    }
+
+    /// Reads once while nothing is asked for.
+    pub(crate) fn listen(&mut self, each: &mut dyn FnMut(&Report)) -> Result<(), BenchError> {
+        let probe = self.probe();
+        let mut heard = pin!(async { probe.listen().map(drop) });
+        self.port.turn(true);
+        let listened = self.poll(heard.as_mut(), &mut io::sink(), each);
+        match listened {
+            Poll::Ready(listened) => listened,
+            Poll::Pending => Ok(()),
         }
     }
 
-    fn error(&self, why: PortError, moving: bool) -> BenchError {
-        BenchError::Port {
-            name: self.name.clone(),
-            why,
-            moving,
-        }
+    /// Stops whatever is done, and waits until the finger is lifted and nothing moves. A second Ctrl-C ends the
+    /// waiting.
+    pub(crate) fn lift(&mut self) -> Result<Stopped, BenchError> {
+        let probe = self.probe();
+        self.done(probe.lift(), &mut io::sink())
     }
 }
 
-/// Waits for Enter, or for Ctrl-C.
-pub(crate) fn wait_for_enter(interrupt: &Interrupt, prompt: &str) -> Result<(), BenchError> {
-    read_answer(interrupt, prompt).map(|_| ())
-}
-
-/// Asks, and waits for a line; Ctrl-C or the end of the input stops.
-pub(crate) fn read_answer(interrupt: &Interrupt, prompt: &str) -> Result<String, BenchError> {
+/// Asks, and waits for a line; `None`: Ctrl-C or the end of the input.
+fn read_answer(interrupt: &Interrupt, prompt: &str) -> io::Result<Option<String>> {
     eprint!("{prompt}");
     let (entered, enter) = mpsc::channel();
     // a blocking read does not see Ctrl-C; the thread ends with the program
@@ -404,13 +333,12 @@ pub(crate) fn read_answer(interrupt: &Interrupt, prompt: &str) -> Result<String,
     });
     loop {
         if interrupt.take() {
-            return Err(BenchError::Stopped);
+            return Ok(None);
         }
         match enter.recv_timeout(Duration::from_millis(100)) {
-            Ok(Ok(Some(line))) => return Ok(line),
-            Ok(Err(why)) => return Err(why.into()),
+            Ok(line) => return line,
             Err(RecvTimeoutError::Timeout) => {}
-            Ok(Ok(None)) | Err(RecvTimeoutError::Disconnected) => return Err(BenchError::Stopped),
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
         }
     }
 }

@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
-use tactus_core::wire::{Command, Report as Told, Reset};
+use tactus_core::wire::{Command, Report as ProbeReport, Reset};
+use tactus_link::Request;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, Owner, Person, Probe, Report, STEPS,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, STEPS,
     Step, Trouble, judge,
 };
-use tactus_link::{LinkError, PortError, Request};
 
 use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
@@ -79,7 +79,7 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         lines: lines(),
     };
     let done = if bringup::next_image(&journal) == Some(Image::Rig) {
-        let (bench, _) = Bench::open(&place)?;
+        let (bench, _) = Bench::open(&place, Format::Text)?;
         let mut linked = Linked(bench);
         bringup::run(Ends::Rig(&mut linked), &mut person, &mut journal)
     } else {
@@ -127,18 +127,18 @@ impl Probe for Linked {
     fn ask(
         &mut self,
         command: Command,
-        each: &mut dyn FnMut(&Told),
+        each: &mut dyn FnMut(&ProbeReport),
     ) -> Result<Result<(), String>, Trouble> {
-        let done = self.0.run(Request::command(command), |report| {
+        let probe = self.0.probe();
+        let done = probe.run(Request::command(command), |report| {
             each(report);
             Ok(())
         });
-        match done {
+        match self.0.done(done, &mut io::sink()) {
             Ok(()) => Ok(Ok(())),
-            Err(BenchError::Port {
-                why: PortError::Link(LinkError::Refused(why)),
-                ..
-            }) => Ok(Err(why.to_string())),
+            Err(BenchError::Operation(why)) if why.refusal().is_some() => {
+                Ok(Err(why.refusal().unwrap_or_default()))
+            }
             Err(why) if why.is_interrupt() => Err(Trouble::Quit),
             Err(why) => Err(io::Error::other(why.to_string()).into()),
         }
@@ -341,7 +341,7 @@ impl Person for Terminal {
     }
 }
 
-impl Owner for Terminal {
+impl Operator for Terminal {
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
         let verdict = if entry.passed { "passed" } else { "FAILED" };
         eprintln!("{verdict}  {}: {}", step.checks, entry.saw);

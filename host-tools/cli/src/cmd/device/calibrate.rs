@@ -2,20 +2,16 @@
 
 use std::io::Write;
 
-use anyhow::{Context as _, ensure};
+use anyhow::ensure;
 use clap::ArgGroup;
 use serde::Serialize;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::rig::weigh::ForceScale;
-use tactus_core::sensor::mems::Mems;
-use tactus_core::sensor::{FingerCode, FingerName, PressureSensor as _};
-use tactus_core::wire::Command;
-use tactus_lab::remote::say::{calibration_rows, date, sensor, turned};
-use tactus_link::Request;
+use tactus_link::operations::{self, Calibrating};
+use tactus_link::say::{date, sensor, turned};
 
-use super::bench::{Bench, BenchError};
+use super::bench::Bench;
 use super::line::Where;
-use crate::cmd::output::{Format, print_json, print_rows};
+use crate::cmd::output::{Format, print_json};
 
 /// Measure what differs from rig to rig, or show and set it
 #[derive(clap::Args)]
@@ -108,108 +104,28 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         how.weights.is_empty() || how.weights.len() >= 3,
         "a line takes three weights or more, as in --weights 30g,60g,90g,120g,150g"
     );
-    let (mut bench, _) = Bench::open(&how.at)?;
-    let mut calibration = bench.get(Request::read_calibration())?;
-    if how.show {
-        return print(how.format, &calibration, out);
-    }
-    // a fault is told on the way; an object is all there is otherwise
-    let mut nowhere = std::io::sink();
-    let told: &mut dyn Write = match how.format {
-        Format::Text => &mut *out,
-        Format::Json => &mut nowhere,
+    let (mut bench, _) = Bench::open(&how.at, how.format)?;
+    let probe = bench.probe();
+    let day = how.date.unwrap_or_else(today);
+    let calibrating = Calibrating {
+        drifted: how.drifted,
+        newton_per_ampere: how.newton_per_ampere,
+        force_mn_per_count: how.force_mn_per_count,
+        weights: how.weights.clone(),
+        day,
     };
-    let mut told = told;
-    if how.turn_over {
-        calibration.pressure.pac_pa_per_count = turn_over(&mut bench, &mut told)?;
-        calibration.turned = how.date.unwrap_or_else(today);
-        let kept = keep(&mut bench, &calibration)?;
-        return print(how.format, &kept, out);
+    let calibrated = async {
+        match (how.show, how.turn_over) {
+            (true, _) => operations::show_calibration(&probe).await,
+            (false, true) => operations::turn_over(&probe, day).await,
+            (false, false) => operations::calibrate(&probe, &calibrating).await,
+        }
+    };
+    let calibration = bench.done(calibrated, out)?;
+    match how.format {
+        Format::Text => Ok(()),
+        Format::Json => print_json(&CalibrationSummary::new(&calibration), out),
     }
-    if how.drifted {
-        calibration.air_known = false;
-        bench.get(Request::write_calibration(&calibration)?)?;
-        bench.perform(Request::command(Command::Home), &mut told)?;
-    }
-    writeln!(
-        told,
-        "Measuring P_DC in the air and, of a rig, the motor's current without load ..."
-    )?;
-    told.flush()?;
-    calibration = bench.perform(Request::calibrate(), &mut told)?;
-    if let Some(newton_per_ampere) = how.newton_per_ampere {
-        calibration.newton_per_ampere = newton_per_ampere;
-    }
-    if let Some(force_mn_per_count) = how.force_mn_per_count {
-        calibration.pressure.force_mn_per_count = force_mn_per_count;
-    }
-    if !how.weights.is_empty() {
-        calibration.pressure.force_mn_per_count = weigh(&mut bench, &how.weights, &mut told)?;
-    }
-    if how.force_mn_per_count.is_some() || !how.weights.is_empty() {
-        calibration.date = how.date.unwrap_or_else(today);
-    }
-    let kept = keep(&mut bench, &calibration)?;
-    print(how.format, &kept, out)
-}
-
-/// Has the probe keep these constants, and asks it for them.
-fn keep(bench: &mut Bench, calibration: &RigCalibration) -> anyhow::Result<RigCalibration> {
-    bench.get(Request::write_calibration(calibration)?)?;
-    let kept = bench.get(Request::read_calibration())?;
-    ensure!(
-        kept == *calibration,
-        "the probe keeps other constants than it was given: calibrate again"
-    );
-    Ok(kept)
-}
-
-/// Acceleration per count, mg, of a finger that a person turns over as asked.
-fn turn_over(bench: &mut Bench, told: &mut impl Write) -> anyhow::Result<f32> {
-    let finger = bench.get(Request::status())?.finger;
-    ensure!(
-        finger == FingerCode::MEMS,
-        "this probe's finger has no accelerometer: only {} is turned over",
-        FingerName::Mems
-    );
-    let turned = bench.perform(Request::turn_over(), told)?;
-    let nominal = Mems::MODEL.calibration.pac_pa_per_count;
-    let mg = 1e3 / turned.g_counts;
-    writeln!(
-        told,
-        "1 g is {:.1} counts: a count is {mg:.4} mg ({:+.1} % of the data sheet's); at 0 g it says {:+.0} mg",
-        turned.g_counts,
-        100.0 * (mg / nominal - 1.0),
-        turned.offset_counts * mg
-    )?;
-    turned.mg_per_count().context(
-        "no sound accelerometer is like that. Point the finger straight down, then straight up, against something upright, and keep it still. If it says the same again, check its supply",
-    )
-}
-
-/// Contact force per count, mN, from known weights, which are asked for.
-fn weigh(bench: &mut Bench, weights: &[u16], told: &mut impl Write) -> anyhow::Result<f32> {
-    let mut points = Vec::new();
-    for &mn in weights {
-        let counts = bench.perform(Request::weigh(mn), told)?;
-        writeln!(told, "{mn} mN: {counts:.1} counts")?;
-        ensure!(
-            counts > 0.0,
-            "P_DC falls under a weight: the load cell is wired the wrong way round. Swap its two signal wires"
-        );
-        points.push((counts, f32::from(mn)));
-    }
-    let scale = ForceScale::of(&points);
-    let scale = scale.context("the weights do not lie on a line through 0: weigh again")?;
-    for (counts, mn) in points {
-        let off = mn - scale.mn_per_count * counts;
-        let share = 100.0 * off / mn;
-        writeln!(
-            told,
-            "{mn:.0} mN: {off:+.0} mN off the line ({share:+.1} %)"
-        )?;
-    }
-    Ok(scale.mn_per_count)
 }
 
 /// A weight in N, or in g with a g behind it, as mN: what a fingertip's line holds for.
@@ -225,13 +141,6 @@ fn newton(text: &str) -> Result<u16, String> {
     }
 }
 
-fn print(format: Format, c: &RigCalibration, out: &mut impl Write) -> anyhow::Result<()> {
-    match format {
-        Format::Text => print_rows(&calibration_rows(c), out),
-        Format::Json => print_json(&CalibrationSummary::new(c), out),
-    }
-}
-
 fn today() -> u32 {
     let (year, month, day) = time::OffsetDateTime::now_utc().to_calendar_date();
     u32::try_from(year).unwrap_or(0) * 10_000 + u32::from(u8::from(month)) * 100 + u32::from(day)
@@ -239,25 +148,16 @@ fn today() -> u32 {
 
 /// Ends a fault.
 pub(crate) fn home(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, _) = Bench::open(at)?;
-    bench.perform(Request::command(Command::Home), out)?;
-    writeln!(
-        out,
-        "Ready: lever and stage have found their limit switches."
-    )?;
-    Ok(())
+    let (mut bench, _) = Bench::open(at, Format::Text)?;
+    let probe = bench.probe();
+    Ok(bench.done(operations::home(&probe), out)?)
 }
 
 /// Stops the rig.
 pub(crate) fn stop(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, _) = Bench::open(at)?;
-    match bench.lift() {
-        BenchError::Stopped => {
-            writeln!(out, "Stopped: the finger is lifted and the stage stands.")?;
-            Ok(())
-        }
-        why => Err(why.into()),
-    }
+    let (mut bench, _) = Bench::open(at, Format::Text)?;
+    let probe = bench.probe();
+    Ok(bench.done(operations::stop(&probe), out)?)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! `tactus device doctor`: whether PC, line, probe and table are fit for work, and what to do where they are not.
 
-use std::io::Write;
-use std::ops::ControlFlow;
+use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::ensure;
@@ -155,7 +154,7 @@ impl Checks {
 /// Checks everything, prints it, and fails where something is wrong.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let mut checks = Checks::default();
-    match Bench::open(&args.at) {
+    match Bench::open(&args.at, args.format) {
         Ok((mut bench, status)) => examine(&mut bench, &status, &mut checks)?,
         Err(why) if why.is_interrupt() => return Err(why.into()),
         Err(why) => unreached(&why, &mut checks),
@@ -295,11 +294,12 @@ fn clock_and_line(bench: &mut Bench, checks: &mut Checks) -> Result<(), BenchErr
         let mut least = f64::INFINITY;
         for _ in 0..LOOKS {
             let asked = Instant::now();
-            let mut at_ms = None;
-            bench.run_until(Request::status(), |report| {
+            let (mut at_ms, probe) = (None, bench.probe());
+            let status = probe.run(Request::status(), |report| {
                 at_ms = Some(report.at_ms);
-                Ok(ControlFlow::Continue(()))
-            })?;
+                Ok(())
+            });
+            bench.done(status, &mut io::sink())?;
             taken.push(asked.elapsed());
             if let Some(at_ms) = at_ms {
                 let here = began.elapsed().as_secs_f64() * 1e3;
@@ -311,7 +311,7 @@ fn clock_and_line(bench: &mut Bench, checks: &mut Checks) -> Result<(), BenchErr
     let before = offset(bench)?;
     let middle = Instant::now();
     while middle.elapsed() < CLOCK {
-        bench.listen(|_| ())?;
+        bench.listen(&mut |_| ())?;
     }
     let after = offset(bench)?;
     // a clock that is fast gains on this one

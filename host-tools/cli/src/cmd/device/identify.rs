@@ -1,17 +1,15 @@
 //! `tactus device identify`: an exploration of the probe, shown step by step.
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use anyhow::Context as _;
 use serde::Serialize;
 use tactus_core::explorer::Told;
 use tactus_core::table::Table;
-use tactus_core::wire::{Command, Identify, Status};
+use tactus_core::wire::{Identify, Status};
 use tactus_lab::eval::evaluate::Method;
-use tactus_lab::eval::show::Show;
 use tactus_lab::eval::transcript::{Answer, Transcript};
-use tactus_lab::remote::say::show_found;
-use tactus_link::Request;
+use tactus_lab::remote::operations;
 use tactus_study::pictures::exploration::Exploration;
 
 use super::bench::Bench;
@@ -116,12 +114,7 @@ struct Identification {
 pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     let Run { args, format, plot } = run;
     let canvas = plot.open()?;
-    let (stdout, mut nowhere) = (out, io::sink());
-    let out: &mut dyn Write = match format {
-        Format::Text => &mut *stdout,
-        Format::Json => &mut nowhere,
-    };
-    let (mut bench, status) = Bench::open(&args.at)?;
+    let (mut bench, status) = Bench::open(&args.at, *format)?;
     // it is in the log then, too
     let bytes = bench.table()?;
     let table = Table::read(&bytes)?;
@@ -129,25 +122,18 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     let wanted = args.wanted(&names, &status)?;
     let (among, seed) = (wanted.among.len(), wanted.seed);
     let among = if among == 0 { names.len() } else { among };
-    writeln!(out, "An unknown texture, one of {among} (seed {seed}).")?;
-    out.flush()?;
-    // for the log: with its samples every slide can be measured again
-    bench.get(Request::command(Command::Stream(true)))?;
-    let mut show = Show::new(table, &mut *out);
     let mut slides = Transcript::default();
     let mut exploration = Exploration::new(table);
-    let found = bench.run(Request::identify(wanted), |report| {
+    let probe = bench.probe();
+    let identified = operations::identify(&probe, wanted, |report| {
         slides.event(&report.event, table);
         if canvas.is_some() {
             exploration.event(&report.event);
         }
-        show.event(&report.event)
-    })?;
-    let answered = show.answered();
-    bench.get(Request::command(Command::Stream(false)))?;
-    let (damaged, missing) = bench.losses();
-    show_found(&found, (damaged, missing), &mut *out)?;
+    });
+    let (identified, answered) = bench.done(identified, out)?;
     if *format == Format::Json {
+        let (frames_damaged, reports_lost) = bench.losses();
         let identification = Identification {
             among,
             threshold: args.stop.threshold,
@@ -155,15 +141,15 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
             seed,
             slides,
             verdict: answered.map(|(verdict, slides)| Answer::new(verdict, slides, table)),
-            learned_slides: found.learned,
-            frames_damaged: damaged,
-            reports_lost: missing,
+            learned_slides: identified.learned,
+            frames_damaged,
+            reports_lost,
         };
-        print_json(&identification, stdout)?;
+        print_json(&identification, out)?;
     }
     if let Some(canvas) = canvas {
         let figures = exploration.figures(args.stop.threshold)?;
-        canvas.write("tactus device identify", &figures, stdout)?;
+        canvas.write("tactus device identify", &figures, out)?;
     }
     Ok(match answered.map(|(verdict, _)| verdict.told()) {
         Some(Told::Sure) => Done::Fully,

@@ -10,8 +10,8 @@ use crate::cmd::environment;
 use crate::cmd::output::{Format, print_json};
 use clap::Args;
 use serde::Serialize;
-use tactus_link::line::{Found, Line, LineError, found, lines, only_nucleo, open, tcp};
-use tactus_link::owner::Owner;
+use tactus_link::line::{Line, LineError, PortInfo, found, lines, only_nucleo, open, tcp};
+use tactus_link::lock::PortLock;
 
 /// Longest that the emulator takes to build its world: recordings are read.
 const STARTING: Duration = Duration::from_secs(120);
@@ -72,8 +72,8 @@ struct Listed<'a> {
     serial_number: Option<&'a str>,
 }
 
-impl<'a> From<&'a Found> for Listed<'a> {
-    fn from(found: &'a Found) -> Self {
+impl<'a> From<&'a PortInfo> for Listed<'a> {
+    fn from(found: &'a PortInfo) -> Self {
         let usb = found.usb.as_ref();
         Self {
             port: &found.name,
@@ -114,7 +114,7 @@ pub(crate) struct Open {
     pub(crate) name: String,
     /// both end with it
     pub(crate) emulator: Option<Emulator>,
-    pub(crate) owner: Option<Owner>,
+    pub(crate) lock: Option<PortLock>,
 }
 
 impl Where {
@@ -126,19 +126,19 @@ impl Where {
                 line: tcp(&emulator.address)?,
                 name: "the emulated board".to_owned(),
                 emulator: Some(emulator),
-                owner: None,
+                lock: None,
             });
         }
         let name = match self.port.clone().or_else(environment::port) {
             Some(port) => port,
             None => only_nucleo(found())?,
         };
-        let (line, owner) = open(&name)?;
+        let (line, lock) = open(&name)?;
         Ok(Open {
             line,
             name,
             emulator: None,
-            owner: Some(owner),
+            lock: Some(lock),
         })
     }
 }
@@ -274,7 +274,7 @@ mod tests {
             manufacturer: None,
             product: Some("STM32 STLink".into()),
         };
-        let found = |name: &str, usb| Found {
+        let found = |name: &str, usb| PortInfo {
             name: name.into(),
             usb,
         };

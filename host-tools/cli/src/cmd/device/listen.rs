@@ -12,6 +12,7 @@ use tactus_link::{ReadTable, Request};
 use super::bench::Bench;
 use super::line::Where;
 use crate::cmd::convert::mcap::Live;
+use crate::cmd::output::Format;
 use crate::cmd::progress::notice;
 use crate::cmd::table_file::is_pipe;
 
@@ -37,19 +38,20 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Listens until Ctrl-C, or until the time is over: nothing is asked of the probe that moves.
 pub(crate) fn run(args: &Listen, out: &mut impl Write) -> anyhow::Result<()> {
     let path = args.mcap.as_deref().context("--mcap")?;
-    let (mut bench, _) = Bench::open(&args.at)?;
+    let (mut bench, _) = Bench::open(&args.at, Format::Text)?;
     let mut file = Live::create(path, &bench.name)?;
-    let mut written = Ok(());
+    let (probe, mut written) = (bench.probe(), Ok(()));
     // with the names of its textures
-    bench.run(ReadTable::default(), |report| {
+    let table = probe.run(ReadTable::default(), |report| {
         file.hear(report, &mut written);
         Ok(())
-    })?;
+    });
+    bench.done(table, out)?;
     bench.get(Request::command(Command::Stream(true)))?;
     notice("Listening; Ctrl-C ends it.");
     let (began, mut reports) = (Instant::now(), 0_u64);
     while args.seconds.is_none_or(|s| began.elapsed() < s) && !bench.interrupt().take() {
-        bench.listen(|report| {
+        bench.listen(&mut |report| {
             reports += 1;
             file.hear(report, &mut written);
         })?;

@@ -1,104 +1,66 @@
-//! Before the probe loses what it has learned: what that is, a copy of its table, and a question.
+//! Consent to a loss of what a probe has learned: the file that its table is kept in first, and the answer to the
+//! question.
 
-use std::io::{IsTerminal as _, Write};
+use std::io::IsTerminal as _;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
-use tactus_core::table::Table;
+use anyhow::Context as _;
 
-use super::bench::{Bench, read_answer};
+use super::bench::BenchError;
 use super::history;
-use crate::cmd::output::Format;
 use crate::cmd::table_file::write_table;
 
-/// How a command that takes something from the probe is allowed to.
-#[derive(clap::Args, Clone, Debug)]
+/// The consent that a command needs which takes something from the probe.
+#[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct Consent {
     /// Do it without asking
     #[arg(long, short)]
-    yes: bool,
+    pub(crate) yes: bool,
     /// Keep the probe's table in this file first, and not in ~/.local/share/tactus/backups
     #[arg(long, value_name = "FILE")]
     backup: Option<PathBuf>,
 }
 
 impl Consent {
-    /// That there is somebody to ask, if that is needed: to be known before a person has worked for it.
+    /// A consent that was given on the command line, of a loss without a file.
+    pub(crate) fn given(yes: bool) -> Self {
+        Self { yes, backup: None }
+    }
+
+    /// Checks that there is somebody to ask, if that is needed: to be known before a person has worked for it.
     ///
     /// # Errors
     /// There is nobody.
-    pub(crate) fn can_be_given(&self) -> anyhow::Result<()> {
+    pub(crate) fn can_be_given(&self) -> Result<(), BenchError> {
         can_be_asked(self.yes)
     }
 
-    /// Says what will be `lost`, keeps the table that the probe uses now, and asks. Nothing has happened to the probe yet.
-    /// Where the output is for programs, that is said on standard error. The file that the table is kept in.
+    /// Keeps a table of this name; the file.
     ///
     /// # Errors
-    /// The table cannot be read or kept, or the answer is no.
-    pub(crate) fn ask(
-        &self,
-        bench: &mut Bench,
-        lost: impl FnOnce(&Table<'_>) -> String,
-        format: Format,
-        out: &mut impl Write,
-    ) -> anyhow::Result<String> {
-        let bytes = bench.table()?;
-        let table = Table::read(&bytes)?;
-        let lost = lost(&table);
+    /// It cannot be kept, in a sentence.
+    pub(super) fn keep(&self, name: &str, table: &[u8]) -> Result<String, String> {
         let file = match &self.backup {
-            Some(file) => file.clone(),
-            None => {
-                // one file for one table, however often it is kept
-                folder()?.join(format!("table-{:08x}.tact", table.crc()))
-            }
+            Some(file) => Ok(file.clone()),
+            None => folder().map(|folder| folder.join(name)),
         };
-        write_table(&file, &bytes)?;
-        let file = file.display().to_string();
-        let said = format!(
-            "{lost}\nThe probe's table is kept: `tactus device table push {file}` brings it back."
-        );
-        confirm(&said, "Go on?", self.yes, bench, format, out)?;
-        Ok(file)
+        let kept = file.and_then(|file| {
+            write_table(&file, table)?;
+            Ok(file.display().to_string())
+        });
+        kept.map_err(|why| format!("{why:#}"))
     }
 }
 
-fn can_be_asked(yes: bool) -> anyhow::Result<()> {
-    if !yes && !std::io::stdin().is_terminal() {
-        bail!("nothing was changed: there is nobody to ask; add --yes to do it");
+/// Checks that there is somebody to ask, unless the answer is yes already.
+pub(super) fn can_be_asked(yes: bool) -> Result<(), BenchError> {
+    match yes || std::io::stdin().is_terminal() {
+        true => Ok(()),
+        false => Err(BenchError::Nobody),
     }
-    Ok(())
 }
 
-/// Says something, on standard error where the output is for programs, and asks, unless that was answered by `yes`.
-///
-/// # Errors
-/// There is nobody to ask, or the answer is no.
-pub(crate) fn confirm(
-    said: &str,
-    question: &str,
-    yes: bool,
-    bench: &Bench,
-    format: Format,
-    out: &mut impl Write,
-) -> anyhow::Result<()> {
-    match format {
-        Format::Text => writeln!(out, "{said}")?,
-        Format::Json => eprintln!("{said}"),
-    }
-    out.flush()?;
-    if yes {
-        return Ok(());
-    }
-    can_be_asked(yes)?;
-    let answer = read_answer(bench.interrupt(), &format!("{question} [y/N] "))?;
-    if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
-        bail!("nothing was changed");
-    }
-    Ok(())
-}
-
-/// Where tables are kept.
+/// The folder that tables are kept in.
 fn folder() -> anyhow::Result<PathBuf> {
     let folder = history::folder()
         .context("there is no home folder to keep the probe's table in: name a file with --backup")?

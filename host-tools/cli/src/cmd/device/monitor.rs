@@ -9,6 +9,8 @@ mod view;
 
 use std::collections::VecDeque;
 use std::io::{self, IsTerminal as _};
+use std::pin::Pin;
+use std::sync::Arc;
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
@@ -16,12 +18,14 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event;
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify, Report};
-use tactus_link::{Job, LinkError, PortError, ReadTable, Request};
+use tactus_link::lifting::Stopped;
+use tactus_link::{LinkError, OperationError, PortError, Probe, Request};
 
 use self::keys::Act;
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
 use super::identify::Args;
+use crate::cmd::output::Format;
 
 /// How often the screen is drawn, and the probe asked how it is.
 const DRAWN: Duration = Duration::from_millis(100);
@@ -29,10 +33,19 @@ const ASKED: Duration = Duration::from_secs(1);
 /// The monitor asks for the status every second, and shows a probe as silent that says nothing for so long.
 const SILENT: Duration = Duration::from_secs(3);
 
-/// What the probe is asked for, one after the other.
-enum Doing {
-    Asked(Box<Job<Request<()>>>),
-    Table(Box<Job<ReadTable>>),
+/// A request under way; the table that it read.
+type Doing = Pin<Box<dyn Future<Output = Result<Option<Arc<[u8]>>, OperationError>>>>;
+
+fn begin(probe: Probe, command: Command) -> Doing {
+    Box::pin(async move {
+        match command {
+            Command::ReadTable(_) => probe.table().await.map(Some),
+            command => {
+                let done = probe.get(Request::command(command)).await;
+                done.map(|()| None)
+            }
+        }
+    })
 }
 
 /// How the user ended it.
@@ -43,8 +56,10 @@ enum End {
 
 /// Watches until the user has enough of it; the rig is stopped and lifted then.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let (mut bench, status) = Bench::open(&args.at)?;
-    let names = bench.names()?;
+    let (mut bench, status) = Bench::open(&args.at, Format::Text)?;
+    let table = bench.table()?;
+    let names = Table::read(&table)?.names().map(str::to_owned);
+    let names: Vec<String> = names.collect();
     let wanted = args.wanted(&names, &status)?;
     if !io::stdout().is_terminal() {
         return Err(io::Error::other(
@@ -59,20 +74,20 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     ratatui::restore();
     let end = match ended {
         Ok(end) => end,
-        Err(why @ BenchError::Port { .. }) => return Err(why.into()),
+        Err(why @ BenchError::Operation(OperationError::Port { .. })) => return Err(why.into()),
         Err(why) => {
             // the line is good
-            bench.lift();
+            let _ = bench.lift();
             return Err(why.into());
         }
     };
     eprintln!("Stopping and lifting the finger (Ctrl-C: do not wait) ...");
-    match (bench.lift(), end) {
-        (BenchError::Stopped, End::Quit) => {
+    match (bench.lift()?, end) {
+        (Stopped::Lifted, End::Quit) => {
             eprintln!("Stopped: the finger is lifted and the stage stands.");
             Ok(())
         }
-        (why, _) => Err(why.into()),
+        (came, _) => Err(BenchError::Operation(came.into()).into()),
     }
 }
 
@@ -88,7 +103,8 @@ fn watch(
     let mut drawn: Option<Instant> = None;
     let mut asked: Option<Instant> = None;
     let mut heard = Instant::now();
-    bench.send(Command::Stream(true))?;
+    let probe = bench.probe();
+    probe.send(Command::Stream(true))?;
     loop {
         if bench.interrupt().take() {
             return Ok(End::Interrupt);
@@ -98,51 +114,49 @@ fn watch(
             monitor.hear(report);
         };
         let polled = match &mut doing {
-            Some(Doing::Asked(job)) => bench.step(job, &mut hear),
-            Some(Doing::Table(job)) => {
-                let polled = bench.step(job, &mut hear)?;
-                if let Poll::Ready(bytes) = &polled {
-                    monitor.take_table(Table::read(bytes)?);
-                }
-                Ok(polled.map(|_| ()))
-            }
-            None => bench.listen(&mut hear).map(|()| Poll::Pending),
+            Some(job) => bench.poll(job.as_mut(), &mut io::sink(), &mut hear),
+            None => bench
+                .listen(&mut hear)
+                .map_or_else(|why| Poll::Ready(Err(why)), |()| Poll::Pending),
         };
         match polled {
-            Ok(Poll::Ready(())) => doing = None,
-            Ok(Poll::Pending) => {}
-            Err(BenchError::Port {
+            Poll::Ready(Ok(table)) => {
+                doing = None;
+                if let Some(bytes) = table {
+                    monitor.take_table(Table::read(&bytes).map_err(OperationError::from)?);
+                }
+            }
+            Poll::Pending => {}
+            Poll::Ready(Err(BenchError::Operation(OperationError::Port {
                 why: PortError::Link(why),
                 ..
-            }) if !matches!(why, LinkError::Protocol(_) | LinkError::Foreign) => {
+            }))) if !matches!(why, LinkError::Protocol(_) | LinkError::Foreign) => {
                 // the probe said why, and goes on
                 doing = None;
                 to_do.clear();
                 monitor.note(Weight::Message, why.to_string());
             }
-            Err(why) => return Err(why),
+            Poll::Ready(Err(why)) => return Err(why),
         }
         if let Some(protocol) = monitor.protocol {
-            return Err(BenchError::Port {
+            let why = OperationError::Port {
                 name: bench.name.clone(),
                 why: PortError::Link(LinkError::Protocol(protocol)),
                 moving: false,
-            });
+            };
+            return Err(why.into());
         }
         if std::mem::take(&mut monitor.rebooted) {
-            bench.send(Command::Stream(true))?;
+            probe.send(Command::Stream(true))?;
         }
         if doing.is_none()
             && let Some(command) = to_do.pop_front()
         {
-            doing = Some(match command {
-                Command::ReadTable(_) => Doing::Table(Box::new(bench.begin(ReadTable::default())?)),
-                command => Doing::Asked(Box::new(bench.begin(Request::command(command))?)),
-            });
+            doing = Some(begin(probe.clone(), command));
         }
         if asked.is_none_or(|at| at.elapsed() >= ASKED) {
             asked = Some(Instant::now());
-            bench.send(Command::Status)?;
+            probe.send(Command::Status)?;
         }
         monitor.silent = Some(heard.elapsed()).filter(|silent| *silent >= SILENT);
         monitor.losses = bench.losses();
@@ -163,7 +177,7 @@ fn watch(
                 Some(Act::Quit) => return Ok(End::Quit),
                 Some(Act::Stop) => {
                     to_do.clear();
-                    bench.send(Command::Stop)?;
+                    probe.send(Command::Stop)?;
                     monitor.asked(&Command::Stop);
                 }
                 Some(Act::Identify) => {

@@ -3,20 +3,17 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::ensure;
 use serde::Serialize;
-use tactus_core::table::Table;
-use tactus_core::wire::Command;
-use tactus_lab::data::recorder::Recorder;
 use tactus_lab::data::recording::{Labels, Texture};
 use tactus_lab::data::recordings::RecordingWriter;
-use tactus_lab::eval::samples::Trials;
 use tactus_lab::eval::show::count;
-use tactus_link::Request;
+use tactus_lab::remote::operations::{self, Wanted};
+use tactus_link::operations::ask_to_lay;
+use tactus_link::person::QuestionKind;
 
-use super::bench::{Bench, Prompts, wait_for_enter};
+use super::bench::Bench;
 use super::line::Where;
-use super::samples::{Sample, ask_to_move};
+use super::samples::Sample;
 use super::train::seed_of_now;
 use crate::cmd::output::{Format, print_json};
 
@@ -73,7 +70,7 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// What `device record` prints with `--format json`.
+/// The object that `device record` prints with `--format json`.
 #[derive(Serialize)]
 struct Recorded<'a> {
     folder: String,
@@ -105,7 +102,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         textures.join(" ")
     );
     let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
-    let (mut bench, status) = Bench::open(&args.at)?;
+    let (mut bench, status) = Bench::open(&args.at, args.format)?;
     writer.label(Labels {
         lot: args.lot.trim().to_owned(),
         operator: args.operator.trim().to_owned(),
@@ -114,80 +111,44 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         finger: status.finger,
         calibrated: status.calibrated,
     });
-    let calibration = bench.get(Request::read_calibration())?;
-    bench.get(Request::command(Command::Stream(true)))?;
-    // a slide of each movement, then the sample is moved
-    let part = match args.sample.asks() {
-        true => Table::read(&bench.table()?)?.movements().len() as u8,
-        false => *slides,
-    };
+    let (probe, mut words) = (bench.probe(), bench.probe().words());
     let (mut written, mut all_lost) = (0, Vec::new());
-    let text = args.format == Format::Text;
     for (index, name) in textures.iter().enumerate() {
         let there = writer.slides(index);
         if there == usize::from(*slides) {
-            if text {
-                writeln!(out, "{name}: its slides were recorded before.")?;
-            }
+            writeln!(words, "{name}: its slides were recorded before.")?;
             written += there;
             continue;
         }
         // some of an interrupted recording, where nobody knows how the sample lay
         writer.forget(index)?;
-        if textures.len() > 1 {
-            let prompt = format!("Lay {name} under the finger and press Enter: ");
-            wait_for_enter(bench.interrupt(), &prompt)?;
-        }
-        let seed = args.seed.unwrap_or_else(seed_of_now);
-        let mut recorder = Recorder::new(calibration.pressure);
-        let (mut lost, mut kept) = (Vec::new(), Vec::new());
-        let (mut prompts, mut trials) = (Prompts::default(), Trials::default());
-        for (trial, begin) in (0..*slides).step_by(part.max(1).into()).enumerate() {
-            if trial > 0 {
-                trials.said(Some(ask_to_move(&bench, name)?));
+        let wanted = Wanted {
+            name: name.clone(),
+            index,
+            slides: *slides,
+            sample: args.sample.known(),
+            seed: args.seed.unwrap_or_else(seed_of_now),
+        };
+        let recorded = async {
+            if textures.len() > 1 {
+                ask_to_lay(&probe, name, QuestionKind::Laid).await?;
             }
-            let wanted = Recorder::wanted(trial, part.min(slides - begin), seed);
-            bench.run(Request::identify(wanted), |report| {
-                match recorder.hear(index, report) {
-                    Some(Ok(slide)) => {
-                        let (number, movement) = (slide.number, slide.movement);
-                        if text {
-                            writeln!(out, "{name}, slide {number} of {slides}: {movement}")?;
-                        }
-                        kept.push((trial, slide));
-                    }
-                    Some(Err(why)) => lost.push(why),
-                    None if text => prompts.show(report, out)?,
-                    None => {}
-                }
-                out.flush()
-            })?;
-        }
-        for (trial, slide) in &kept {
-            if args.sample.asks() {
-                writer.moved(trials.before_trial(*trial));
-            }
+            operations::record(&probe, &wanted).await
+        };
+        let recorded = bench.done(recorded, out)?;
+        for (slide, moved) in &recorded.slides {
+            writer.moved(*moved);
             writer.write(slide)?;
         }
-        written += kept.len();
-        if text {
-            for why in &lost {
-                writeln!(out, "{name}: a slide is not recorded: {why}")?;
-            }
-        }
-        all_lost.extend(lost.into_iter().map(|why| Lost {
+        written += recorded.slides.len();
+        all_lost.extend(recorded.lost.into_iter().map(|why| Lost {
             texture: name.trim(),
             why: why.to_string(),
         }));
-        ensure!(
-            !kept.is_empty(),
-            "{name}: no slide arrived whole; check the cable, then record again"
-        );
     }
-    bench.get(Request::command(Command::Stream(false)))?;
     writer.finish()?;
     let folder = args.out.display();
-    if !text {
+    if args.format == Format::Json {
         let recorded = Recorded {
             folder: folder.to_string(),
             textures: textures.len(),
@@ -196,6 +157,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         };
         return print_json(&recorded, out);
     }
+    // of textures that were recorded before
+    out.write_all(&probe.take_words())?;
     writeln!(
         out,
         "{folder}: {} of {}. Next: tactus features --recordings {folder}",

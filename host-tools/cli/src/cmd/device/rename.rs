@@ -5,8 +5,8 @@ use std::io::Write;
 use serde::Serialize;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire;
-use tactus_lab::remote::say::{forgotten, name_of};
-use tactus_link::Request;
+use tactus_link::operations;
+use tactus_link::say::name_of;
 
 use super::bench::Bench;
 use super::line::Where;
@@ -31,7 +31,7 @@ pub(crate) struct Rename {
     format: Format,
 }
 
-/// What `device rename` prints with `--format json`.
+/// The object that `device rename` prints with `--format json`.
 #[derive(Serialize)]
 struct Renamed<'n> {
     from: &'n str,
@@ -57,7 +57,7 @@ pub(crate) struct Forget {
     format: Format,
 }
 
-/// What `device forget` prints with `--format json`.
+/// The object that `device forget` prints with `--format json`.
 #[derive(Serialize)]
 struct Forgotten {
     /// "texture", "training" or "self-learned".
@@ -65,7 +65,7 @@ struct Forgotten {
     /// Its name; `null` for what the probe learned by itself.
     name: Option<String>,
     /// Where the probe's table is kept as it was.
-    backup: String,
+    backup: Option<String>,
 }
 
 #[derive(clap::Args)]
@@ -85,23 +85,21 @@ struct What {
 /// Gives a texture another name.
 pub(crate) fn rename(args: &Rename, out: &mut impl Write) -> anyhow::Result<()> {
     let to = name_of(&args.to)?;
-    let (mut bench, _) = Bench::open(&args.at)?;
+    let (mut bench, _) = Bench::open(&args.at, args.format)?;
     let from = known(&bench.table()?, &args.from)?;
-    bench.get(Request::rename(from.clone(), to.clone()))?;
-    match args.format {
-        Format::Text => writeln!(out, "{from} is {to} now.")?,
-        Format::Json => {
-            let (from, to) = (&from[..], &to[..]);
-            print_json(&Renamed { from, to }, out)?;
-        }
+    let probe = bench.probe();
+    bench.done(operations::rename(&probe, &from, &to), out)?;
+    if args.format == Format::Json {
+        let (from, to) = (&from[..], &to[..]);
+        print_json(&Renamed { from, to }, out)?;
     }
     Ok(())
 }
 
 /// Has the probe forget something.
 pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, _) = Bench::open(&args.at)?;
-    let (what, kind, name) = match (&args.what.name, &args.what.training) {
+    let (mut bench, _) = Bench::open(&args.at, args.format)?;
+    let (wanted, what, name) = match (&args.what.name, &args.what.training) {
         (Some(name), _) => {
             let name = known(&bench.table()?, name)?;
             (wire::Forget::Texture(name.clone()), "texture", Some(name))
@@ -112,20 +110,16 @@ pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> 
         }
         (None, None) => (wire::Forget::SelfLearned, "self-learned", None),
     };
-    let said = forgotten(&what);
-    let lost = |_: &Table<'_>| format!("The probe is to forget {said}.");
-    let backup = args.consent.ask(&mut bench, lost, args.format, out)?;
-    bench.get(Request::forget(what))?;
-    match args.format {
-        Format::Text => writeln!(out, "The probe has forgotten {said}.")?,
-        Format::Json => {
-            let forgotten = Forgotten {
-                what: kind,
-                name: name.map(|name| name.to_string()),
-                backup,
-            };
-            print_json(&forgotten, out)?;
-        }
+    bench.consents(&args.consent);
+    let probe = bench.probe();
+    bench.done(operations::forget(&probe, wanted), out)?;
+    if args.format == Format::Json {
+        let forgotten = Forgotten {
+            what,
+            name: name.map(|name| name.to_string()),
+            backup: bench.backup(),
+        };
+        print_json(&forgotten, out)?;
     }
     Ok(())
 }

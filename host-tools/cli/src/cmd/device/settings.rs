@@ -3,15 +3,11 @@
 use std::io::Write;
 
 use clap::{ArgGroup, ValueEnum};
-use serde::Serialize;
-use tactus_core::table::Table;
-use tactus_core::wire::Command;
-use tactus_lab::remote::say::{HIGH_FORCE, YIELDS, show_settings};
-use tactus_link::Request;
+use tactus_link::operations;
 
 use super::bench::Bench;
 use super::line::Where;
-use super::loss::confirm;
+use super::loss::Consent;
 use crate::cmd::args::false_alarm;
 use crate::cmd::output::{Format, print_json};
 
@@ -53,43 +49,23 @@ enum Switch {
     Off,
 }
 
-/// What `device settings --format json` prints.
-#[derive(Serialize)]
-struct Settings {
-    /// What was set; `null`: nothing, the table's own holds.
-    false_alarm: Option<f32>,
-    /// What the table in use was learned for; `null`: it has no limits.
-    table_false_alarm: Option<f32>,
-    /// Whether movements may press with up to 2 N.
-    high_force: bool,
-}
-
 /// Shows the settings, and changes them first where that is asked for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, mut status) = Bench::open(&args.at)?;
-    if args.as_table || args.false_alarm.is_some() {
-        let set = Command::SetFalseAlarm(args.false_alarm);
-        bench.get(Request::command(set))?;
-        status = bench.get(Request::status())?;
-    }
-    if let Some(switch) = args.high_force {
-        let on = switch == Switch::On;
-        if on && !status.high_force {
-            confirm(HIGH_FORCE, YIELDS, args.yes, &bench, args.format, out)?;
+    let (mut bench, _) = Bench::open(&args.at, args.format)?;
+    bench.consents(&Consent::given(args.yes));
+    let probe = bench.probe();
+    let set = async {
+        if args.as_table || args.false_alarm.is_some() {
+            operations::set_false_alarm(&probe, args.false_alarm).await?;
         }
-        bench.get(Request::command(Command::SetHighForce(on)))?;
-        status = bench.get(Request::status())?;
-    }
-    let bytes = bench.table()?;
-    let of_table = Table::read(&bytes)?.limits();
-    let settings = Settings {
-        false_alarm: status.false_alarm,
-        table_false_alarm: of_table.map(|limits| limits.false_alarm),
-        high_force: status.high_force,
+        if let Some(switch) = args.high_force {
+            operations::set_high_force(&probe, switch == Switch::On).await?;
+        }
+        operations::settings(&probe).await
     };
-    if args.format == Format::Json {
-        return print_json(&settings, out);
+    let settings = bench.done(set, out)?;
+    match args.format {
+        Format::Json => print_json(&settings, out),
+        Format::Text => Ok(()),
     }
-    show_settings(&status, settings.table_false_alarm, out)?;
-    Ok(())
 }

@@ -5,13 +5,12 @@ use std::io::Write;
 use serde::Serialize;
 use tactus_core::rig::Fault;
 use tactus_core::wire::Status;
-use tactus_lab::remote::say::status_rows;
-use tactus_link::Request;
+use tactus_link::operations;
 
 use super::bench::Bench;
 use super::calibrate::CalibrationSummary;
 use super::line::Where;
-use crate::cmd::output::{Format, print_json, print_rows};
+use crate::cmd::output::{Format, print_json};
 
 /// Show the state of the probe: rig, faults, table, counters
 #[derive(clap::Args)]
@@ -47,27 +46,25 @@ struct Summary<'a> {
 
 /// Prints the probe's status.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut bench, status) = Bench::open(&args.at)?;
-    let calibration = bench.get(Request::read_calibration())?;
-    let (damaged, missing) = bench.losses();
-    let (joule, wear) = status.skin_mj;
-    let [joule, wear] = [joule, wear].map(|mj| f64::from(mj) * 1e-3);
-    if args.format == Format::Json {
-        let summary = Summary {
-            port: &bench.name,
-            status: &status,
-            table_checksum: format!("{:08x}", status.table_crc),
-            recovery: status.fault.map(Fault::recovery),
-            skin_j: joule,
-            wear_j: wear,
-            frames_damaged: damaged,
-            reports_lost: missing,
-            calibration: CalibrationSummary::new(&calibration),
-        };
-        return print_json(&summary, out);
+    let (mut bench, _) = Bench::open(&args.at, args.format)?;
+    let probe = bench.probe();
+    let (status, calibration) = bench.done(operations::status(&probe), out)?;
+    if args.format == Format::Text {
+        return Ok(());
     }
-    print_rows(
-        &status_rows(&bench.name, &status, &calibration, (damaged, missing)),
-        out,
-    )
+    let (frames_damaged, reports_lost) = bench.losses();
+    let (joule, wear) = status.skin_mj;
+    let [skin_j, wear_j] = [joule, wear].map(|mj| f64::from(mj) * 1e-3);
+    let summary = Summary {
+        port: &bench.name,
+        status: &status,
+        table_checksum: format!("{:08x}", status.table_crc),
+        recovery: status.fault.map(Fault::recovery),
+        skin_j,
+        wear_j,
+        frames_damaged,
+        reports_lost,
+        calibration: CalibrationSummary::new(&calibration),
+    };
+    print_json(&summary, out)
 }

@@ -3,15 +3,13 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
 use clap::Subcommand;
 use serde::Serialize;
 use tactus_core::table::Table;
-use tactus_core::wire;
+use tactus_core::wire::Status;
 use tactus_lab::eval::show::{count, show_table};
 use tactus_lab::eval::table_summary::TableSummary;
-use tactus_lab::remote::say::{replaced, uses_factory};
-use tactus_link::{PushTable, Request};
+use tactus_link::operations;
 
 use super::bench::Bench;
 use super::line::Where;
@@ -71,7 +69,7 @@ pub(crate) enum Command {
     },
 }
 
-/// What `device table push` and `factory` print with `--format json`.
+/// The object that `device table push` and `factory` prints with `--format json`.
 #[derive(Serialize)]
 struct InUse {
     /// The table that was pushed; `null`: the firmware's own.
@@ -85,33 +83,24 @@ struct InUse {
 }
 
 impl InUse {
-    fn print(&self, format: Format, out: &mut impl Write) -> anyhow::Result<()> {
-        let (textures, checksum) = (count(self.textures, "texture"), &self.checksum);
-        match (format, &self.file) {
-            (Format::Json, _) => print_json(self, out)?,
-            (Format::Text, Some(file)) => writeln!(
-                out,
-                "{file}: the probe uses it now: {textures}, checksum {checksum}"
-            )?,
-            (Format::Text, None) => writeln!(out, "{}", uses_factory(self.textures, checksum))?,
-        }
-        Ok(())
-    }
-
-    /// As the probe says it now.
-    fn new(
-        bench: &mut Bench,
+    /// Prints what the probe uses now, for programs.
+    fn print(
+        (bench, now): (&Bench, &Status),
         file: Option<String>,
-        backup: Option<String>,
-    ) -> anyhow::Result<Self> {
-        let status = bench.get(Request::status())?;
-        Ok(Self {
+        format: Format,
+        out: &mut impl Write,
+    ) -> anyhow::Result<()> {
+        if format == Format::Text {
+            return Ok(());
+        }
+        let in_use = Self {
             file,
-            textures: status.textures,
-            bytes: status.table_bytes,
-            checksum: format!("{:08x}", status.table_crc),
-            backup,
-        })
+            textures: now.textures,
+            bytes: now.table_bytes,
+            checksum: format!("{:08x}", now.table_crc),
+            backup: bench.backup(),
+        };
+        print_json(&in_use, out)
     }
 }
 
@@ -119,7 +108,7 @@ impl InUse {
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()> {
     match command {
         Command::Show { at, format } => {
-            let (mut bench, status) = Bench::open(at)?;
+            let (mut bench, status) = Bench::open(at, *format)?;
             let bytes = bench.table()?;
             if *format == Format::Json {
                 return print_json(&TableSummary::new(Table::read(&bytes)?), out);
@@ -133,7 +122,7 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             show_table(Table::read(&bytes)?, out)?;
         }
         Command::Pull { at, file, format } => {
-            let bytes = Bench::open(at)?.0.table()?;
+            let bytes = Bench::open(at, *format)?.0.table()?;
             write_table(file, &bytes)?;
             let out = &mut beside(file, out);
             let table = Table::read(&bytes)?;
@@ -156,38 +145,23 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             let mut bytes = Vec::new();
             let table = read_table(file, &mut bytes)?;
             let file = file.display().to_string();
-            let push = PushTable::new(table.as_bytes()).with_context(|| file.clone())?;
-            let (mut bench, status) = Bench::open(at)?;
-            table
-                .of_finger(status.finger)
-                .with_context(|| file.clone())?;
-            // the firmware's own table is never lost
-            let loses = !status.factory && status.table_crc != table.crc();
-            let lost = |old: &Table<'_>| replaced(old, Some(&table));
-            let backup = loses.then(|| consent.ask(&mut bench, lost, *format, out));
-            let backup = backup.transpose()?;
-            bench.get(push)?;
-            // not what was sent counts, but what the probe uses from now on
-            let now = InUse::new(&mut bench, Some(file), backup)?;
-            let pushed = format!("{:08x}", table.crc());
-            ensure!(
-                now.checksum == pushed,
-                "the probe uses the table {} and not {pushed}, the one pushed: push it again",
-                now.checksum
-            );
-            now.print(*format, out)?;
+            let (mut bench, _) = Bench::open(at, *format)?;
+            bench.consents(consent);
+            let probe = bench.probe();
+            let pushed = operations::push(&probe, &file, table.as_bytes());
+            let now = bench.done(pushed, out)?;
+            InUse::print((&bench, &now), Some(file), *format, out)?;
         }
         Command::Factory {
             at,
             consent,
             format,
         } => {
-            let (mut bench, status) = Bench::open(at)?;
-            let lost = |old: &Table<'_>| replaced(old, None);
-            let backup = (!status.factory).then(|| consent.ask(&mut bench, lost, *format, out));
-            let backup = backup.transpose()?;
-            bench.get(Request::command(wire::Command::FactoryTable))?;
-            InUse::new(&mut bench, None, backup)?.print(*format, out)?;
+            let (mut bench, _) = Bench::open(at, *format)?;
+            bench.consents(consent);
+            let probe = bench.probe();
+            let now = bench.done(operations::factory(&probe), out)?;
+            InUse::print((&bench, &now), None, *format, out)?;
         }
     }
     Ok(())

@@ -1,17 +1,13 @@
 //! `tactus device verify`: whether what lies under the probe's finger is one of its textures.
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use anyhow::Context as _;
-use tactus_core::explorer::Strategy;
 use tactus_core::table::Table;
-use tactus_core::wire::{Command, Identify};
-use tactus_lab::eval::verified::{print_answer, print_slide};
-use tactus_lab::remote::say::show_verifying;
-use tactus_lab::remote::verifying::{Verifying, config_of};
-use tactus_link::Request;
+use tactus_core::wire::Identify;
+use tactus_lab::remote::operations;
 
-use super::bench::{Bench, Prompts};
+use super::bench::Bench;
 use super::line::Where;
 use super::rename::known;
 use super::train::seed_of_now;
@@ -45,47 +41,23 @@ pub(crate) struct Args {
 
 /// Has the probe find it out.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
-    let (mut bench, status) = Bench::open(&args.at)?;
+    let (mut bench, status) = Bench::open(&args.at, args.format)?;
     let bytes = bench.table()?;
-    let table = Table::read(&bytes)?;
     let reference = known(&bytes, &args.name)?;
-    let texture = table
+    let texture = Table::read(&bytes)?
         .find(&reference)
         .context("a name of the table is in the table")?;
     let wanted = Identify {
-        among: std::iter::once(texture).collect(),
         threshold: args.stop.threshold,
         max_slides: args.stop.max_slides,
-        strategy: Strategy::Cycling,
         seed: args.seed.unwrap_or_else(seed_of_now),
         false_alarm: args.stop.false_alarm.or(status.false_alarm),
         ..Identify::default()
     };
-    let mut verifying = Verifying::new(&bytes, texture, config_of(&wanted))?;
-    let text = args.format == Format::Text;
-    if text {
-        writeln!(out, "Is it {}?", verifying.reference())?;
-        out.flush()?;
-    }
-    let mut prompts = Prompts::default();
-    bench.run(Request::command(Command::Verify(wanted)), |report| {
-        let slide = verifying.hear(&report.event);
-        if text {
-            match slide {
-                Some(slide) => print_slide(slide, out)?,
-                None => show_verifying(report, &mut prompts, out)?,
-            }
-        }
-        if text {
-            out.flush()
-        } else {
-            io::Result::Ok(())
-        }
-    })?;
-    let verified = verifying.end();
-    match args.format {
-        Format::Json => print_json(&verified, out)?,
-        Format::Text => print_answer(&verified, out)?,
+    let probe = bench.probe();
+    let verified = bench.done(operations::verify(&probe, texture, wanted), out)?;
+    if args.format == Format::Json {
+        print_json(&verified, out)?;
     }
     Ok(Done::of(&verified))
 }

@@ -225,12 +225,12 @@ impl Soak<'_> {
         let before = self.talk.board().rig().sensor_commands();
         let counts = self.status()?.counts;
         let after = self.talk.board().rig().sensor_commands();
-        let session = self.talk.session();
+        let (damaged, missing) = self.talk.losses();
         Ok(Tally {
             counts,
             commands: (before, after),
             now_s: self.now_s(),
-            lost_reports: session.damaged() + session.missing(),
+            lost_reports: damaged + missing,
         })
     }
 

@@ -20,7 +20,8 @@ pub const OFF_LINE: f32 = 0.1;
 pub const SPEED_SHARE: f64 = 0.02;
 /// How far the stage may be from where its mean speed has it, mm: at the fastest a report may be 3 ms late.
 pub const UNEVEN_MM: f64 = 0.3;
-/// Reports of a run that are no steady speed, at each end: it takes 63 ms to its highest speed, and a report comes each 50 ms.
+/// Reports of a run that are no steady speed, at each end: it takes 63 ms to its highest speed, and a report comes each
+/// 50 ms.
 const RAMP: usize = 3;
 /// Slower than this it stands or turns round, um/s.
 const STANDS_UM_S: i32 = 2_000;
@@ -40,7 +41,8 @@ pub struct SlideSeen {
     pub counts: Counts,
 }
 
-/// P_DC above that in the air, counts, under known weights, mN, how it changes under the last one, and after that was taken away.
+/// P_DC above that in the air, counts, under known weights, mN, how it changes under the last one, and after that was
+/// taken away.
 pub fn scale(points: &[[f64; 2]], held: f32, after: f32) -> Finding {
     let points: Vec<(f32, f32)> = points
         .iter()
@@ -83,7 +85,8 @@ pub fn scale(points: &[[f64; 2]], held: f32, after: f32) -> Finding {
     .wrong(!dead && !leaks && !uneven && far, &m::SCALE_FAR, "")
 }
 
-/// The constants after each of two calibrations, and whether the firmware keeps the force scale, mN a count, that it was given.
+/// The constants after each of two calibrations, and whether the firmware keeps the force scale, mN a count, that it
+/// was given.
 pub fn zero(
     first: &Result<RigCalibration, String>,
     second: &Result<RigCalibration, String>,

@@ -1,4 +1,5 @@
-//! What each step judges, at both sides of its limits; and that no check of the judge could go without a case here failing.
+//! What each step judges, at both sides of its limits; and that no check of the judge could go without a case here
+//! failing.
 
 use std::cell::Cell;
 use std::panic::Location;
@@ -234,7 +235,8 @@ fn zeroed(second: f32, kept: Option<&Result<(f32, bool), String>>) -> Finding {
     mounted::zero(&calibrated(2640.0), &calibrated(second), kept)
 }
 
-/// Runs of the stage at shares of the speeds that are asked for; the fastest one is slower in its first half by so many mm.
+/// Runs of the stage at shares of the speeds that are asked for; the fastest one is slower in its first half by so many
+/// mm.
 fn runs(shares: [f64; 4], uneven_mm: f64) -> Finding {
     let mut places: Vec<(u32, Live)> = Vec::new();
     let (mut at_ms, mut stage_um) = (0, 5_000.0);

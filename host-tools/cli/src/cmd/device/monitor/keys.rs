@@ -2,7 +2,7 @@
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use tactus_core::table::Name;
-use tactus_lab::remote::say::name_of;
+use tactus_link::say::name_of;
 
 use super::state::{Monitor, Weight};
 use crate::cmd::names;

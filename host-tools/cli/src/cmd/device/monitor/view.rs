@@ -13,7 +13,7 @@ use tactus_core::dsp::{BIN_HZ, Plan, SpectrumSum};
 use tactus_core::features::Property;
 use tactus_core::wire::Phase;
 use tactus_lab::eval::show::count;
-use tactus_lab::remote::say::phase_name;
+use tactus_link::say::phase_name;
 
 use super::keys::KEYS;
 use super::state::{Monitor, SHOWN, Weight};

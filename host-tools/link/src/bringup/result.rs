@@ -4,7 +4,7 @@ use super::judge::Finding;
 
 /// What a step has found, and what can be drawn of it.
 #[derive(Debug)]
-pub struct Found {
+pub struct StepResult {
     /// The finding.
     pub finding: Finding,
     /// Axes, and points.
@@ -22,7 +22,7 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
 }
 
-impl From<Finding> for Found {
+impl From<Finding> for StepResult {
     fn from(finding: Finding) -> Self {
         Self {
             finding,

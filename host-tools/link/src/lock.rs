@@ -1,4 +1,5 @@
-//! Who has a port: one command at a time, told by a locked file. The system unlocks it when the process ends, however it ends.
+//! Locks of ports: one command at a time has a port, by a locked file. The system unlocks it when the process ends,
+//! however it ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, Write as _};
@@ -8,16 +9,17 @@ use std::time::{Duration, SystemTime};
 
 /// The port is this process's for as long as this lives.
 #[derive(Debug)]
-pub struct Owner(#[expect(dead_code, reason = "its lock ends with it")] Option<File>);
+pub struct PortLock(#[expect(dead_code, reason = "its lock ends with it")] Option<File>);
 
 /// Another command has the port.
 #[derive(PartialEq, Debug, thiserror::Error)]
 #[error(
-    "{port} is used by `{command}` (process {process}) since {}: wait for it or end it, it cannot be watched from a second \
+    "{port} is used by `{command}` (process {process}) since {}: wait for it or end it, it cannot be watched from a \
+         second \
      command",
     ago(*.for_)
 )]
-pub struct Owned {
+pub struct PortInUse {
     port: String,
     command: String,
     process: u32,
@@ -32,7 +34,7 @@ fn ago(time: Duration) -> String {
     }
 }
 
-/// Where the files lie: only this user can write there.
+/// The folder of the locks: only this user can write there.
 fn folder() -> Option<PathBuf> {
     let given = |variable| std::env::var_os(variable).map(PathBuf::from);
     given("XDG_RUNTIME_DIR")
@@ -58,19 +60,19 @@ fn file_name(port: &str) -> String {
     same.chars().map(plain).collect::<String>() + ".lock"
 }
 
-impl Owner {
+impl PortLock {
     /// Takes the port. Where there is no place for the file, nobody is told, and nobody is kept out.
     ///
     /// # Errors
     /// Another command of this user has it.
-    pub fn take(port: &str) -> Result<Self, Owned> {
+    pub fn take(port: &str) -> Result<Self, PortInUse> {
         match folder() {
             Some(folder) => Self::take_in(&folder, port),
             None => Ok(Self(None)),
         }
     }
 
-    fn take_in(folder: &Path, port: &str) -> Result<Self, Owned> {
+    fn take_in(folder: &Path, port: &str) -> Result<Self, PortInUse> {
         let path = folder.join(file_name(port));
         let mut options = OpenOptions::new();
         // what another one wrote stays until the lock is ours
@@ -110,7 +112,7 @@ impl Owner {
                 let mut lines = text.lines();
                 let mut number = || lines.next().and_then(|line| line.parse::<u64>().ok());
                 let (process, since) = (number().unwrap_or(0), number());
-                Err(Owned {
+                Err(PortInUse {
                     port: port.to_owned(),
                     command: lines.next().unwrap_or("another tactus").to_owned(),
                     process: process as u32,
@@ -132,22 +134,22 @@ mod tests {
     #[test]
     fn a_port_has_one_owner_who_is_named_and_is_free_when_that_ends() {
         let folder = tempfile::tempdir().unwrap();
-        let first = Owner::take_in(folder.path(), "tcp:127.0.0.1:7429").unwrap();
-        let owned = Owner::take_in(folder.path(), "tcp:localhost:7429").map(|_| ());
+        let first = PortLock::take_in(folder.path(), "tcp:127.0.0.1:7429").unwrap();
+        let owned = PortLock::take_in(folder.path(), "tcp:localhost:7429").map(|_| ());
         // localhost may be ::1 here first: then it is another port
         if let Err(owned) = owned {
             assert_eq!(owned.process, std::process::id());
         }
-        let said = Owner::take_in(folder.path(), "tcp:127.0.0.1:7429")
+        let said = PortLock::take_in(folder.path(), "tcp:127.0.0.1:7429")
             .unwrap_err()
             .to_string();
         assert!(
             said.contains("used by `tactus") && said.contains("since 0 s"),
             "{said}"
         );
-        assert!(Owner::take_in(folder.path(), "tcp:127.0.0.1:7430").is_ok());
+        assert!(PortLock::take_in(folder.path(), "tcp:127.0.0.1:7430").is_ok());
         drop(first);
-        assert!(Owner::take_in(folder.path(), "tcp:127.0.0.1:7429").is_ok());
+        assert!(PortLock::take_in(folder.path(), "tcp:127.0.0.1:7429").is_ok());
     }
 
     #[test]

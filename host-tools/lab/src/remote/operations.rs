@@ -1,0 +1,320 @@
+//! Operations on a probe that take a laboratory: its slides are held against a table here, or become recordings. The
+//! others are
+//! those of [`link::operations`](tactus_link::operations).
+
+use std::io::{self, Write as _};
+
+use serde::{Deserialize, Serialize};
+use tactus_core::explorer::{Strategy, Verdict};
+use tactus_core::table::{Contents, Table};
+use tactus_core::wire::{Command, Event, Identify, Report, Status};
+
+use super::say::compare;
+use super::verifying::{Verifying, config_of};
+use crate::data::recorder::{RecordError, Recorder};
+use crate::data::recording::{Labels, Recording};
+use crate::eval::alike::{self, Alike};
+use crate::eval::refresh::{
+    Moved, NewSlide, Pair, RefreshError, Refreshed, refresh as moved_table,
+};
+use crate::eval::samples::Trials;
+use crate::eval::show::Show;
+use crate::eval::verified::{Verified, print_answer, print_slide};
+pub use tactus_link::operations::Learned;
+use tactus_link::operations::{self, Sample, Training, ask_to_lay, ask_to_move};
+use tactus_link::person::QuestionKind;
+use tactus_link::say::{Prompts, count, show_verifying};
+use tactus_link::{Identified, OperationError, Probe, Request};
+
+type Result<T> = std::result::Result<T, OperationError>;
+
+/// Textures that are named as having moved most.
+const NAMED: usize = 5;
+
+/// Has the probe explore, and shows every step; the verdict and after how many slides it came.
+pub async fn identify(
+    probe: &Probe,
+    wanted: Identify,
+    mut each: impl FnMut(&Report),
+) -> Result<(Identified, Option<(Verdict, u8)>)> {
+    let bytes = probe.table().await?;
+    let table = Table::read(&bytes)?;
+    let among = match wanted.among.len() {
+        0 => usize::from(table.textures()),
+        some => some,
+    };
+    let (mut words, seed) = (probe.words(), wanted.seed);
+    writeln!(words, "An unknown texture, one of {among} (seed {seed}).")?;
+    let mut show = Show::new(table, words);
+    let identified = operations::identify(probe, wanted, |report| {
+        each(report);
+        show.event(&report.event)
+    });
+    let identified = identified.await?;
+    Ok((identified, show.answered()))
+}
+
+/// Names the texture of the last exploration, and compares it with the others.
+pub async fn teach(probe: &Probe, name: &str) -> Result<(Learned, Option<Alike>)> {
+    compared(probe, operations::teach(probe, name).await?)
+}
+
+/// Has the probe make slides of a texture and learn it, and compares it with the others.
+pub async fn train(probe: &Probe, training: &Training) -> Result<(Learned, Option<Alike>)> {
+    compared(probe, operations::train(probe, training).await?)
+}
+
+fn compared(probe: &Probe, learned: Learned) -> Result<(Learned, Option<Alike>)> {
+    let table = Table::read(&learned.table)?;
+    let texture = table.find(&learned.name);
+    let nearest = texture.and_then(|texture| alike::nearest(table, texture));
+    if let Some(nearest) = &nearest {
+        compare(&learned.name, learned.is_new, nearest, &mut probe.words())?;
+    }
+    Ok((learned, nearest))
+}
+
+/// Has the probe find out whether what lies under its finger is this texture of its table.
+pub async fn verify(probe: &Probe, texture: u16, wanted: Identify) -> Result<Verified> {
+    let bytes = probe.table().await?;
+    let wanted = Identify {
+        among: std::iter::once(texture).collect(),
+        strategy: Strategy::Cycling,
+        ..wanted
+    };
+    let verifying = Verifying::new(&bytes, texture, config_of(&wanted));
+    let mut verifying = verifying.map_err(OperationError::said)?;
+    let (mut prompts, mut words) = (Prompts::default(), probe.words());
+    writeln!(words, "Is it {}?", verifying.reference())?;
+    let request = Request::command(Command::Verify(wanted));
+    let each = |report: &Report| match verifying.hear(&report.event) {
+        Some(slide) => print_slide(slide, &mut words),
+        None => show_verifying(report, &mut prompts, &mut words),
+    };
+    probe.run(request, each).await?;
+    let verified = verifying.end();
+    print_answer(&verified, &mut probe.words())?;
+    Ok(verified)
+}
+
+/// A recording to be made.
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+pub struct Wanted {
+    /// The texture.
+    pub name: String,
+    /// Its index in the recordings.
+    #[serde(default)]
+    pub index: usize,
+    /// Slides.
+    pub slides: u8,
+    /// Knowledge of the sample.
+    #[serde(default, rename = "moved")]
+    pub sample: Sample,
+    /// For where on the sample slides begin.
+    pub seed: u32,
+}
+
+/// Slides of a texture.
+#[derive(Debug)]
+pub struct Recorded {
+    /// Those that arrived whole, each with whether the sample was moved before it.
+    pub slides: Vec<(Recording, Option<bool>)>,
+    /// Reasons why others did not.
+    pub lost: Vec<RecordError>,
+    /// The status of the probe that made them.
+    pub status: Status,
+}
+
+impl Recorded {
+    /// The slides with what is known of each, beside what is known of all.
+    pub fn labelled(&self, labels: &Labels) -> Vec<(Recording, Labels)> {
+        let slides = self.slides.iter().map(|(slide, moved)| {
+            let labels = Labels {
+                finger: self.status.finger,
+                calibrated: self.status.calibrated,
+                moved: *moved,
+                ..labels.clone()
+            };
+            (slide.clone(), labels)
+        });
+        slides.collect()
+    }
+}
+
+/// Has the probe make slides, movements of its table in turn, and records them.
+pub async fn record(probe: &Probe, wanted: &Wanted) -> Result<Recorded> {
+    let (name, slides) = (&wanted.name[..], wanted.slides);
+    let calibration = probe.get(Request::read_calibration()).await?;
+    let status = probe.get(Request::status()).await?;
+    // a slide of each movement, then the sample is moved
+    let part = match wanted.sample {
+        Sample::Asked => Table::read(&probe.table().await?)?.movements().len() as u8,
+        Sample::Noted(_) => slides,
+    };
+    probe.get(Request::command(Command::Stream(true))).await?;
+    let mut recorder = Recorder::new(calibration.pressure);
+    let (mut lost, mut kept) = (Vec::new(), Vec::new());
+    let (mut prompts, mut samples) = (Prompts::default(), Trials::default());
+    let mut words = probe.words();
+    for (trial, begin) in (0..slides).step_by(part.max(1).into()).enumerate() {
+        if trial > 0 {
+            samples.said(Some(ask_to_move(probe, name).await?));
+        }
+        let trial_wanted = Recorder::wanted(trial, part.min(slides - begin), wanted.seed);
+        let each = |report: &Report| {
+            match recorder.hear(wanted.index, report) {
+                Some(Ok(slide)) => {
+                    let (number, movement) = (slide.number, slide.movement);
+                    writeln!(words, "{name}, slide {number} of {slides}: {movement}")?;
+                    kept.push((trial, slide));
+                }
+                Some(Err(why)) => lost.push(why),
+                None => prompts.show(report, &mut words)?,
+            }
+            io::Result::Ok(())
+        };
+        probe.run(Request::identify(trial_wanted), each).await?;
+    }
+    probe.get(Request::command(Command::Stream(false))).await?;
+    for why in &lost {
+        writeln!(words, "{name}: a slide is not recorded: {why}")?;
+    }
+    if kept.is_empty() {
+        return Err(OperationError::said(format!(
+            "{name}: no slide arrived whole; check the cable, then record again"
+        )));
+    }
+    let slides = kept.into_iter().map(|(trial, slide)| {
+        let moved = match wanted.sample {
+            Sample::Asked => samples.before_trial(trial),
+            Sample::Noted(moved) => moved,
+        };
+        (slide, moved)
+    });
+    Ok(Recorded {
+        slides: slides.collect(),
+        lost,
+        status,
+    })
+}
+
+/// The table of a probe after its skin or finger was replaced.
+#[derive(Debug, Serialize)]
+pub struct RefreshedProbe {
+    /// Slides that it goes by.
+    pub slides: usize,
+    /// The way of all textures together, standard deviations of a slide.
+    pub together: f64,
+    /// The way of each beyond that.
+    pub moved: Vec<Moved>,
+    /// Textures without a new slide.
+    pub left_out: Vec<String>,
+    /// Pairs that cannot be told apart now.
+    pub alike: Vec<Pair>,
+    /// Checksum of the table in use; CRC-32, hexadecimal.
+    pub checksum: String,
+}
+
+/// Has the probe slide over every texture once at each movement, and moves its table, with somebody's consent.
+pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedProbe> {
+    let bytes = probe.table().await?;
+    let table = Table::read(&bytes)?;
+    if !matches!(table.contents(), Contents::Fused(..)) {
+        return Err(OperationError::said(RefreshError::NotFused));
+    }
+    let (mut slides, mut left_out, mut words) = (Vec::new(), Vec::new(), probe.words());
+    for (texture, name) in (0..).zip(table.names()) {
+        if !ask_to_lay(probe, name, QuestionKind::LaidOrLeftOut).await? {
+            left_out.push(name.to_owned());
+            continue;
+        }
+        let made = slides_of(probe, table, texture, seed()).await?;
+        writeln!(words, "{name}: {}", count(made.len() as u64, "slide"))?;
+        slides.extend(made);
+    }
+    let Refreshed {
+        bytes: new,
+        together,
+        moved,
+        alike,
+    } = moved_table(table, &slides).map_err(OperationError::said)?;
+    let mut refreshed = RefreshedProbe {
+        slides: slides.len(),
+        together,
+        moved,
+        left_out,
+        alike,
+        checksum: String::new(),
+    };
+    refreshed.print(&mut words)?;
+    let lost = "The probe is to use the table that has moved.";
+    let status = operations::replace_table(probe, &new, lost, "refresh again").await?;
+    refreshed.checksum = format!("{:08x}", status.table_crc);
+    Ok(refreshed)
+}
+
+/// One slide of a texture at each movement.
+async fn slides_of(
+    probe: &Probe,
+    table: Table<'_>,
+    texture: u16,
+    seed: u32,
+) -> Result<Vec<NewSlide>> {
+    let Contents::Fused(set, length) = table.contents() else {
+        return Ok(Vec::new());
+    };
+    // never sure: all slides are made
+    let wanted = Identify {
+        among: std::iter::once(texture).collect(),
+        threshold: 1.0,
+        max_slides: table.movements().len() as u8,
+        strategy: Strategy::Cycling,
+        open: false,
+        seed,
+        ..Identify::default()
+    };
+    let (mut made, mut prompts, mut words) = (Vec::new(), Prompts::default(), probe.words());
+    let each = |report: &Report| match &report.event {
+        Event::SlideReport {
+            action, observed, ..
+        } => {
+            let features = observed.observation().vector(set, length.into());
+            made.extend(features.map(|features| NewSlide {
+                texture,
+                movement: action.movement,
+                features: features.to_vec(),
+            }));
+            Ok(())
+        }
+        _ => show_verifying(report, &mut prompts, &mut words),
+    };
+    probe.run(Request::identify(wanted), each).await?;
+    Ok(made)
+}
+
+impl RefreshedProbe {
+    fn print(&self, out: &mut impl io::Write) -> io::Result<()> {
+        let together = self.together;
+        writeln!(
+            out,
+            "All textures moved together by {together:.1} standard deviations of a slide."
+        )?;
+        let most = self.moved.iter().take(NAMED);
+        let most = most.map(|m| format!("{} ({:.1})", m.texture, m.moved));
+        let most = most.collect::<Vec<_>>().join(", ");
+        writeln!(out, "Beyond that moved most: {most}.")?;
+        if !self.left_out.is_empty() {
+            let all = self.left_out.join(", ");
+            writeln!(
+                out,
+                "Moved with the others only, as they were left out: {all}."
+            )?;
+        }
+        for pair in &self.alike {
+            let since = if pair.before { "as before" } else { "any more" };
+            let (first, second) = (&pair.first, &pair.second);
+            writeln!(out, "{first} and {second} cannot be told apart {since}.")?;
+        }
+        Ok(())
+    }
+}
