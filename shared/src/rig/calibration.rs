@@ -57,8 +57,9 @@ impl RigCalibration {
     /// Bytes of a stored record.
     pub const BYTES: usize = 64;
 
-    /// Returns the record as it is stored: nine f32, the date, the day on which the accelerometer was turned over, the serial
-    /// number, and a CRC-32 of these; little-endian. The highest bit of the date is set where P_DC in the air is known.
+    /// Returns the record as it is stored: nine f32, the date, the day on which the accelerometer was turned over, the
+    /// serial number, and a CRC-32 of these; little-endian. The highest bit of the date is set where P_DC in the air is
+    /// known.
     #[inline(never)]
     pub fn to_bytes(&self) -> Vec<u8, { Self::BYTES }> {
         let air = if self.air_known { Self::AIR_KNOWN } else { 0 };

@@ -16,8 +16,8 @@ use super::talk::{TIMEOUT_S, Talk, TalkError};
 use crate::board::referee::Violation;
 use crate::board::{self, Emulator, Slide};
 
-/// Samples that the sensor sees at boot, while the firmware finds out which finger there is; 14 of an MCP3202, which takes every
-/// command for one of its own.
+/// Samples that the sensor sees at boot, while the firmware finds out which finger there is; 14 of an MCP3202, which
+/// takes every command for one of its own.
 const ASKED_AT_BOOT: u64 = 16;
 /// A whole exploration, virtual seconds.
 const EXPLORATION_S: f64 = 600.0;
@@ -372,7 +372,8 @@ impl Exploration {
             ),
         );
         let slots = u64::from(counts.slots);
-        // a slot is counted before its command goes out; while the finger is looked for, its part is asked outside of slots
+        // a slot is counted before its command goes out; while the finger is looked for, its part is asked outside of
+        // slots
         let least = self.commands.0.saturating_sub(ASKED_AT_BOOT);
         let possible = least..=self.commands.1 + u64::from(counts.late_slots) + 1;
         check(
