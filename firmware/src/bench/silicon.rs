@@ -1,10 +1,11 @@
-//! What only silicon can answer: whether the kernels in assembly give what their plain twins give, how many cycles they take, how
-//! long the flash takes to write and to erase, how often the ring of the motor's current turns and a slot begins.
+//! What only silicon can answer: whether the kernels in assembly give what their plain twins give, how many cycles
+//! they take, how long the flash takes to write and to erase, how often the ring of the motor's current turns and a
+//! slot begins.
 //!
-//! It has a runner of its own. The host of `embedded-test` names each test by a semihosting call (SYS_GET_CMDLINE) that the
-//! emulated board does not answer, and `defmt-test` ends with the first test that fails, by a panic, which here lifts a lever and starts
-//! again. This image makes all checks, prints a line for each over defmt, and leaves by semihosting's exit, which probe-rs
-//! hands on. No motor moves.
+//! It has a runner of its own. The host of `embedded-test` names each test by a semihosting call (SYS_GET_CMDLINE)
+//! that the emulated board does not answer, and `defmt-test` ends with the first test that fails, by a panic, which
+//! here lifts a lever and starts again. This image makes all checks, prints a line for each over defmt, and leaves by
+//! semihosting's exit, which probe-rs hands on. No motor moves.
 use core::arch::asm;
 use core::fmt::Display;
 
@@ -32,7 +33,8 @@ const SAMPLES: usize = 3 * RATE_HZ as usize;
 type Words = Vec<i16, SAMPLES>;
 const RESULTS: usize = 4096;
 
-/// The work, and the cycles that it takes by the emulator's model (the test `silicon_image` of the emulated board keeps it true).
+/// The work, and the cycles that it takes by the emulator's model (the test `silicon_image` of the emulated board
+/// keeps it true).
 const CASES: [(&str, Workload, u32); 3] = [
     ("band power", Workload::BandPower, 503_092),
     ("frame", Workload::Frame, 32_178),
@@ -48,7 +50,8 @@ const SECTOR_OFFSET: u32 = 6 * SECTOR;
 /// Writes of as many bytes as the driver programs at a time, by words.
 const WRITES: u32 = 64;
 const WRITE: usize = 16;
-/// The data sheet's limits with 32 bits at a time (table 48: 16 us and 1 s are typical), and 1 % of the driver's for the erase.
+/// The data sheet's limits with 32 bits at a time (table 48: 16 us and 1 s are typical), and 1 % of the driver's for
+/// the erase.
 const WORD_US: u32 = 100;
 const ERASE_US: u32 = 2_020_000;
 

@@ -1,5 +1,5 @@
-//! The inner loops of a slide for this chip. Their plain twins are `tactus_core::dsp::Kernels::PLAIN`: `cargo xtask bench`
-//! compares them, to the bit.
+//! The inner loops of a slide for this chip. Their plain twins are `tactus_core::dsp::Kernels::PLAIN`: `cargo xtask
+//! bench` compares them, to the bit.
 
 use core::arch::{asm, global_asm};
 use core::mem::MaybeUninit;
@@ -22,9 +22,9 @@ const WORDS: usize = (TAPS - 1 + MOST * AT_ONCE) / 4 + 4;
 static HALF_FILTERS: HalfFilters = HALVES;
 
 // Two outputs by three filters of half the length instead of four ([`HALVES`]), six of each at once, two products an
-// instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3, r5 and r7 those between them; r8 to
-// r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 18 steps make the loop: all has to fit into the
-// flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
+// instruction: r2, r4 and r6 are those that begin with the first sample of a pair, r3, r5 and r7 those between them;
+// r8 to r10 are pairs of samples, r11 and r12 pairs of coefficients. Six of the 18 steps make the loop: all has to fit
+// into the flash accelerator's 1 KB, and an inline assembly block leaves too few registers.
 global_asm!(
     // the assembler is not told of the FPU otherwise
     ".fpu fpv4-sp-d16",
@@ -61,8 +61,8 @@ global_asm!(
     // r0: pairs of coefficients; r1: words of samples; r2: how many twelves, not 0. Sum of squares in r0 and r1.
     "tactus_band_energy:",
     "push {{r4-r11, lr}}",
-    // 0: filters of even samples; 24: of sums, less those one later; 48: sum of squares; 56: an odd output without the even
-    // samples one later; 60: twelves to go
+    // 0: filters of even samples; 24: of sums, less those one later; 48: sum of squares; 56: an odd output without the
+    // even samples one later; 60: twelves to go
     "sub sp, sp, #64",
     "mov r3, #0",
     "strd r3, r3, [sp, #48]",
@@ -185,15 +185,15 @@ global_asm!(
 );
 
 unsafe extern "C" {
-    /// `words` are those that `tactus_halve` made of [`TAPS`] - 1 and 12 `twelves` samples, 3 more, and at least one is to be
-    /// computed.
+    /// `words` are those that `tactus_halve` made of [`TAPS`] - 1 and 12 `twelves` samples, 3 more, and at least one
+    /// is to be computed.
     fn tactus_band_energy(
         filters: *const HalfFilters,
         words: *const [u32; 3],
         twelves: usize,
     ) -> u64;
-    /// Makes `words` of 4 `fours` and 2 samples, one more than `fours`: even samples, sums of an odd one and the even one
-    /// after it, and odd ones, two to a word. No sample is outside -16384..=16383.
+    /// Makes `words` of 4 `fours` and 2 samples, one more than `fours`: even samples, sums of an odd one and the even
+    /// one after it, and odd ones, two to a word. No sample is outside -16384..=16383.
     fn tactus_halve(samples: *const i16, words: *mut [u32; 3], fours: usize);
 }
 
@@ -225,8 +225,8 @@ unsafe fn clip_fours(samples: *const i16, clipped: *mut i16, many: usize) {
     }
 }
 
-/// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what the plain one does, in its
-/// order (VMLA rounds the product).
+/// [`Kernels::fold_frame`], two angles at a time: sums of two samples by one instruction, and then what the plain one
+/// does, in its order (VMLA rounds the product).
 #[inline(never)]
 fn fold_frame<'r>(
     angles: &Angles,
@@ -234,8 +234,8 @@ fn fold_frame<'r>(
     buffer: &'r mut MaybeUninit<Folded>,
 ) -> &'r mut Folded {
     let begin: *mut Complex32 = buffer.as_mut_ptr().cast();
-    // SAFETY: it reads all angles, an even number, and the whole frame, whose words need not be aligned; all of `buffer` is
-    // written.
+    // SAFETY: it reads all angles, an even number, and the whole frame, whose words need not be aligned; all of
+    // `buffer` is written.
     unsafe {
         asm!(
             "2:",
@@ -442,8 +442,8 @@ fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
         if twelves == 0 {
             return sum + (Kernels::PLAIN.band_energy)(taps, rest);
         }
-        // SAFETY: as `twelves` was computed, no sample is read that is not there, and the words have room for them; what of
-        // these was never written does not count.
+        // SAFETY: as `twelves` was computed, no sample is read that is not there, and the words have room for them;
+        // what of these was never written does not count.
         unsafe {
             tactus_halve(rest.as_ptr(), words, (TAPS - 1 + AT_ONCE * twelves) / 4);
             sum += tactus_band_energy(&raw const HALF_FILTERS, words, twelves);

@@ -1,4 +1,5 @@
-//! The inner loops of a slide. A chip may bring faster ones without touching the core: they are functions of a [`super::Plan`].
+//! The inner loops of a slide. A chip may bring faster ones without touching the core: they are functions of a
+//! [`super::Plan`].
 
 use core::mem::MaybeUninit;
 
@@ -8,8 +9,8 @@ use microfft::real::rfft_64;
 
 use super::plan::{Angles, FRAME, Folded, TAPS, Taps};
 
-/// The loops that cost the time of a slide. [`Kernels::PLAIN`] is the reference: other ones give the same integers, and the
-/// same floats to the bit.
+/// The loops that cost the time of a slide. [`Kernels::PLAIN`] is the reference: other ones give the same integers,
+/// and the same floats to the bit.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernels {
     /// Copies samples; beyond what 12 bits can differ by, -4096..=4095, they are clipped. There are as many of both.
@@ -23,8 +24,8 @@ pub struct Kernels {
     /// the sum of products inside i32.
     pub band_energy: fn(taps: &Taps, samples: &[i16]) -> u64,
 
-    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No sample
-    /// is outside -16384..=16383, so that sums of two are 16 bits.
+    /// Multiplies a frame by twice the Hann window, 1 - cos(2 pi n / N), and folds it as [`Kernels::fold`] does. No
+    /// sample is outside -16384..=16383, so that sums of two are 16 bits.
     pub fold_frame: for<'r> fn(
         angles: &Angles,
         frame: &[i16; FRAME],
@@ -32,16 +33,17 @@ pub struct Kernels {
     ) -> &'r mut Folded,
 
     /// Halves the transform of reals, of which each of `reals` has one and that half of them later: the first half of
-    /// `folded`, transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose bins
-    /// are 0, 2, 4 and so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to 128.
+    /// `folded`, transformed, is bins 1, 5, 9 and so on, and the other one has the reals, in such pairs again, whose
+    /// bins are 0, 2, 4 and so on (decimation in frequency). Both are as long as each other, a power of 2 from 8 to
+    /// 128.
     pub fold: fn(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]),
 
-    /// Transforms 32, 64 or 128 values in place, as microfft does (decimation in time, radix 2); others stay as they are. The
-    /// sign of a 0 is open.
+    /// Transforms 32, 64 or 128 values in place, as microfft does (decimation in time, radix 2); others stay as they
+    /// are. The sign of a 0 is open.
     pub transform: fn(angles: &Angles, values: &mut [Complex32]),
 
-    /// Returns the lower half of the transform of reals, as microfft does: that of the last bin, which is real, is the imaginary
-    /// part of the first one.
+    /// Returns the lower half of the transform of reals, as microfft does: that of the last bin, which is real, is the
+    /// imaginary part of the first one.
     pub transform_reals:
         for<'r> fn(angles: &Angles, reals: &'r mut Reals) -> &'r mut [Complex32; FRAME / 16],
 

@@ -17,8 +17,8 @@ pub(crate) const HISTORY: usize = TAPS - 1;
 /// Samples in a frame.
 pub const FRAME: usize = 512;
 
-/// The constants of every slide: the filter's coefficients, the angles of window and transform, and the loops that go through
-/// them.
+/// The constants of every slide: the filter's coefficients, the angles of window and transform, and the loops that go
+/// through them.
 #[derive(Clone, Debug)]
 pub struct Plan {
     taps: Taps,

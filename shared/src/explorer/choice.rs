@@ -1,4 +1,5 @@
-//! The next movement: the one that should leave the least confusion among the textures that are still likely (eq. 7, 11-13).
+//! The next movement: the one that should leave the least confusion among the textures that are still likely (eq. 7,
+//! 11-13).
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,8 @@ use super::posterior::Explorer;
 use crate::features::Property;
 use crate::table::{Action, Gaussian, MAX_ACTIONS};
 
-/// Slides of a movement that come to nothing, one after the other, before it is left out for the rest of the exploration.
+/// Slides of a movement that come to nothing, one after the other, before it is left out for the rest of the
+/// exploration.
 const TRIES: u8 = 2;
 
 /// What an action is expected to bring.
@@ -31,8 +33,8 @@ pub fn confusion(a: Gaussian, b: Gaussian) -> f32 {
 }
 
 impl<const N: usize> Explorer<'_, N> {
-    /// The slide that `action` asked for came to nothing: it was not made, or it gave no features. Its movement is tried
-    /// once more, then left out for the rest of this exploration. Whether anything is left to choose from.
+    /// The slide that `action` asked for came to nothing: it was not made, or it gave no features. Its movement is
+    /// tried once more, then left out for the rest of this exploration. Whether anything is left to choose from.
     pub fn reject(&mut self, action: Action) -> bool {
         if let Some(failed) = self.failed.get_mut(usize::from(action.movement)) {
             *failed = failed.saturating_add(1);
@@ -45,9 +47,9 @@ impl<const N: usize> Explorer<'_, N> {
         failed.is_some_and(|&failed| failed >= TRIES)
     }
 
-    /// The next action, given the `outcomes` of [`Explorer::expected_outcomes`], of those that are not left out. While all
-    /// are ([`Explorer::reject`]), it means nothing. [`Strategy::Random`] takes its choice from `random`; the other strategies
-    /// ignore it.
+    /// The next action, given the `outcomes` of [`Explorer::expected_outcomes`], of those that are not left out. While
+    /// all are ([`Explorer::reject`]), it means nothing. [`Strategy::Random`] takes its choice from `random`; the
+    /// other strategies ignore it.
     pub fn choose(&self, outcomes: &[ExpectedOutcome], random: u32) -> Action {
         let chosen = match self.config.strategy {
             Strategy::Bayesian => {
@@ -104,8 +106,8 @@ impl<const N: usize> Explorer<'_, N> {
         }
     }
 
-    /// What cycling goes through: the best action of each property when nothing is known, properties in their order; where
-    /// all is looked at, every movement. What is left out is not among them.
+    /// What cycling goes through: the best action of each property when nothing is known, properties in their order;
+    /// where all is looked at, every movement. What is left out is not among them.
     pub fn turns(&self) -> impl Iterator<Item = Action> {
         let all = self
             .actions
@@ -190,8 +192,8 @@ impl<const N: usize> Explorer<'_, N> {
 
 /// Benefit of an action that leaves `uncertainty` and was made `made` times before (eq. 12).
 ///
-/// Eq. 13 reads alpha = 1/n, which has no value for an action that was never made; taken as infinity, all untried actions
-/// would tie. Here alpha = 1/(n+1).
+/// Eq. 13 reads alpha = 1/n, which has no value for an action that was never made; taken as infinity, all untried
+/// actions would tie. Here alpha = 1/(n+1).
 pub fn benefit(uncertainty: f32, made: u8) -> f32 {
     if made == 0 {
         return 1.0 - uncertainty.clamp(0.0, 1.0);

@@ -1,5 +1,5 @@
-//! Degrees of confusion that are kept: constants of table and candidates, computed once instead of at every decision. A PC
-//! has the memory for them; a chip has not, and its image has none of this.
+//! Degrees of confusion that are kept: constants of table and candidates, computed once instead of at every decision.
+//! A PC has the memory for them; a chip has not, and its image has none of this.
 
 use heapless::Vec;
 
@@ -18,12 +18,12 @@ const ROWS: usize = 4;
 /// Degrees of confusion of two textures by some actions (eq. 7).
 pub type Degrees = [f32; LANES];
 
-/// Degrees of confusion of every two candidates of an explorer by each of its actions, in memory that the caller brings.
-/// They serve every explorer of the same table, candidates and method: [`Explorer::expected_outcomes_by`].
+/// Degrees of confusion of every two candidates of an explorer by each of its actions, in memory that the caller
+/// brings. They serve every explorer of the same table, candidates and method: [`Explorer::expected_outcomes_by`].
 #[derive(Clone, Copy, Debug)]
 pub struct Confusions<M> {
-    /// Square matrices, one for every few actions, and below each a row of what every texture has to do with its own degrees
-    /// (`LiveGaussian`'s root). A texture with itself has 0: eq. 10 leaves it out.
+    /// Square matrices, one for every few actions, and below each a row of what every texture has to do with its own
+    /// degrees (`LiveGaussian`'s root). A texture with itself has 0: eq. 10 leaves it out.
     matrices: M,
     textures: usize,
 }
@@ -73,8 +73,8 @@ impl<M: AsRef<[Degrees]> + AsMut<[Degrees]>> Confusions<M> {
 }
 
 impl<const N: usize> Explorer<'_, N> {
-    /// As [`Explorer::expected_outcomes`], to the bit, by degrees of confusion that were computed before: of an explorer of
-    /// the same table, candidates and method.
+    /// As [`Explorer::expected_outcomes`], to the bit, by degrees of confusion that were computed before: of an
+    /// explorer of the same table, candidates and method.
     pub fn expected_outcomes_by(
         &self,
         confusions: &Confusions<impl AsRef<[Degrees]>>,
@@ -116,8 +116,8 @@ impl<const N: usize> Explorer<'_, N> {
             .collect()
     }
 
-    /// Passes `tell` the degree of confusion of every two candidates by an action, as a decision computes it: that adds it
-    /// to both, times a probability that is 1 here; and a candidate's own root, where it has one.
+    /// Passes `tell` the degree of confusion of every two candidates by an action, as a decision computes it: that
+    /// adds it to both, times a probability that is 1 here; and a candidate's own root, where it has one.
     fn confuse_all(&self, action: Action, mut tell: impl FnMut(usize, Option<usize>, f32)) {
         let is_candidate = |log: &i32| *log >= LEAST;
         let certain: Vec<f32, N> = self
@@ -186,8 +186,8 @@ fn confuse_each<L>(
     }
 }
 
-/// Uncertainty that is expected to remain (eq. 10) by each of some actions, of which this is the matrix, when these textures
-/// are that probable, and have these weights and roots.
+/// Uncertainty that is expected to remain (eq. 10) by each of some actions, of which this is the matrix, when these
+/// textures are that probable, and have these weights and roots.
 #[inline(never)]
 fn uncertainty(
     matrix: &[Degrees],
@@ -207,7 +207,8 @@ fn uncertainty(
         let [Some(a), Some(b), Some(c), Some(d)] = rows else {
             continue;
         };
-        // What is added, and in which order, is as where degrees are computed: those before a texture, then those after it.
+        // What is added, and in which order, is as where degrees are computed: those before a texture, then those
+        // after it.
         let mut confused = [[0.0; LANES]; ROWS];
         for (&(texture, _), [weights, _]) in live.iter().zip(weights) {
             for (confused, row) in confused.iter_mut().zip([a, b, c, d]) {

@@ -7,7 +7,8 @@ use super::overlap::OVERLAP;
 use crate::features::Property;
 use crate::table::{Action, Gaussian, Table};
 
-/// A texture that is still likely, while an expected uncertainty is computed from the Gaussians of one property. #[derive(Clone, Copy, Debug)]
+/// A texture that is still likely, while an expected uncertainty is computed from the Gaussians of one property.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct LiveGaussian {
     /// Its probability times `root`.
     pub(super) weight: f32,
@@ -68,7 +69,8 @@ impl LiveTexture {
     }
 }
 
-/// Textures that far apart are not confused: 25 ln 2, where the exponential is half of the last place of a number near 1.
+/// Textures that far apart are not confused: 25 ln 2, where the exponential is half of the last place of a number near
+/// 1.
 pub(super) const FAR: f32 = 17.33;
 
 /// Degree of confusion of two textures by one property (eq. 7).
@@ -139,8 +141,8 @@ pub(super) fn uncertainty_of(live: &mut [LiveTexture], properties: usize) -> f32
         .sum()
 }
 
-/// Adds the confusion of `a` with each of `others` (eq. 7) to what they are confused with. Means and standard deviations are a
-/// table's: finite, and these above 0.
+/// Adds the confusion of `a` with each of `others` (eq. 7) to what they are confused with. Means and standard
+/// deviations are a table's: finite, and these above 0.
 pub(super) fn confuse(a: &mut LiveGaussian, others: &mut [LiveGaussian]) {
     let LiveGaussian {
         weight,
@@ -205,8 +207,8 @@ const fn reciprocal_roots() -> [u32; 128] {
     table
 }
 
-/// The square root of a normal number above 0, correctly rounded, in a third of the time that `libm` takes for it on the chip:
-/// Goldschmidt's iterations in whole numbers.
+/// The square root of a normal number above 0, correctly rounded, in a third of the time that `libm` takes for it on
+/// the chip: Goldschmidt's iterations in whole numbers.
 #[inline(always)]
 fn root(x: f32) -> f32 {
     const THREE: u32 = 3 << 30;
@@ -279,7 +281,8 @@ mod tests {
         assert_eq!(exp_neg(f32::INFINITY), 0.0);
         for n in 0..860_000 {
             let x = n as f32 * 1e-4;
-            // polynomial and its roundings; the argument in octaves is rounded twice, by half of 2^-23 and log2 e's 2^-26
+            // polynomial and its roundings; the argument in octaves is rounded twice, by half of 2^-23 and log2 e's
+            // 2^-26
             let bound = 4e-7 + 8e-8 * f64::from(x);
             let exact = (-f64::from(x)).exp();
             assert!((f64::from(exp_neg(x)) / exact - 1.0).abs() < bound, "{x}");

@@ -19,8 +19,8 @@ const SLIDES: u8 = 4;
 const MOST_OFF: i32 = (1 << 26) - 1;
 
 impl<const N: usize> Explorer<'_, N> {
-    /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The rest
-    /// of the slide is not used.
+    /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The
+    /// rest of the slide is not used.
     ///
     /// # Errors
     /// See [`ObserveError`]; nothing has changed then.
@@ -60,7 +60,8 @@ impl<const N: usize> Explorer<'_, N> {
         self.slides = self.slides.saturating_add(1);
     }
 
-    /// The value of a property of a slide, at most twice as far out as any mean that a table can hold: squares stay finite.
+    /// The value of a property of a slide, at most twice as far out as any mean that a table can hold: squares stay
+    /// finite.
     fn value(slide: &Observation, property: Property) -> Result<f32, ObserveError> {
         let reach = mean_step(property) * 65536.0;
         let x = slide.properties.get(property).filter(|x| x.is_finite());
@@ -234,8 +235,8 @@ impl<const N: usize> Explorer<'_, N> {
     }
 }
 
-/// Adds the likelihood (eq. 4; ln, Q16, up to a constant) of every texture when a property is `x`, in steps of the means.
-/// Where nothing was learned, the standard deviation is 0, it adds nothing.
+/// Adds the likelihood (eq. 4; ln, Q16, up to a constant) of every texture when a property is `x`, in steps of the
+/// means. Where nothing was learned, the standard deviation is 0, it adds nothing.
 #[inline(never)]
 fn add_gaussians(x: f32, known: &Gaussians<'_>, logs: &mut [i32]) {
     let scale = known.scale();

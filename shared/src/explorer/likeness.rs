@@ -25,8 +25,8 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// One that is not compared yet. Of `known` the first `features` are its mean; each of these is shrunk by one of `scales`,
-    /// in 1/2^15, if there are any.
+    /// One that is not compared yet. Of `known` the first `features` are its mean; each of these is shrunk by one of
+    /// `scales`, in 1/2^15, if there are any.
     pub(super) fn new(
         known: &[u8],
         features: usize,
@@ -103,8 +103,8 @@ impl Likeness {
     }
 }
 
-/// By what the axes of a movement are shrunk, to compare textures learned from `n` slides in spite of this drift: there the
-/// mean of a slide has the variance 1 + 1/n + delta instead of 1 + 1/n.
+/// By what the axes of a movement are shrunk, to compare textures learned from `n` slides in spite of this drift:
+/// there the mean of a slide has the variance 1 + 1/n + delta instead of 1 + 1/n.
 fn scales(drifts: Numbers<'_>, n: u8) -> White {
     let v = 1.0 + 1.0 / f32::from(n.max(1));
     let mut scales = White::default();

@@ -1,13 +1,13 @@
-//! The overlap of two densities of the same width over their distance, for the paper's confusion (eq. 7): a table and three
-//! operations in place of an exponential.
+//! The overlap of two densities of the same width over their distance, for the paper's confusion (eq. 7): a table and
+//! three operations in place of an exponential.
 
 /// Steps of [`OVERLAP`] up to 25 octaves.
 const STEPS: usize = 31;
 
-/// Coefficients, from the constant one on, of a 32nd of 2 to the power of -(5 z / 31)^2 around each whole z from 0 to 31, then
-/// from -32 to -1, and towards the next one away from 0: the overlap of two densities of the same width, at most 5e-5 off.
-/// From 31 on, beyond 25 octaves, it is half of the last place of a number near 1: 0. The fourth number is nothing: 16 bytes
-/// are easily found.
+/// Coefficients, from the constant one on, of a 32nd of 2 to the power of -(5 z / 31)^2 around each whole z from 0 to
+/// 31, then from -32 to -1, and towards the next one away from 0: the overlap of two densities of the same width, at
+/// most 5e-5 off. From 31 on, beyond 25 octaves, it is half of the last place of a number near 1: 0. The fourth number
+/// is nothing: 16 bytes are easily found.
 pub(super) const OVERLAP: [[f32; 4]; 64] = overlap();
 
 #[expect(

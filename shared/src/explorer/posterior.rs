@@ -1,7 +1,7 @@
 //! The posterior of every texture (eq. 3), and the verdict.
 //!
-//! Probabilities are kept as logarithms in fixed point, and in f32. Host and chip use the same operations in the same order,
-//! so they agree to the bit.
+//! Probabilities are kept as logarithms in fixed point, and in f32. Host and chip use the same operations in the same
+//! order, so they agree to the bit.
 
 use heapless::Vec;
 
@@ -23,9 +23,9 @@ pub(super) const OUT: i32 = -(5 << 28);
 pub(super) const LEAST: i32 = -(1 << 30);
 /// What is left of a candidate's when the greatest is 0: however improbable, it stays one.
 const FLOOR: i32 = -(1 << 28);
-/// Log-odds for "none of these" over which a texture counts as unknown, after one slide and after more (the recipe has 2 and
-/// 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather than 1 or 2
-/// was chosen on the BioTac recordings, one material left out, to keep false alarms below 3 %.
+/// Log-odds for "none of these" over which a texture counts as unknown, after one slide and after more (the recipe has
+/// 2 and 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather
+/// than 1 or 2 was chosen on the BioTac recordings, one material left out, to keep false alarms below 3 %.
 const UNKNOWN_OVER: [f32; 2] = [2.0, 1.5];
 /// Log-odds up to which a verdict is certain enough to learn from.
 const CERTAIN: f32 = -2.0;
@@ -45,8 +45,8 @@ pub struct Verdict {
     pub unknown: bool,
     /// Whether it is the most probable one, but not as it was learned: worn, drifted, or something much like it.
     pub changed: bool,
-    /// Log-odds that it is none of them, where the method can tell; with a calibrated table, by how much its score exceeds
-    /// the limit.
+    /// Log-odds that it is none of them, where the method can tell; with a calibrated table, by how much its score
+    /// exceeds the limit.
     pub log_odds: Option<f32>,
 }
 
@@ -165,8 +165,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         &self.posterior
     }
 
-    /// The answer, once there is one: the threshold is exceeded, the texture is unknown, or the last slide was made. There
-    /// is none before the first slide, however few the candidates.
+    /// The answer, once there is one: the threshold is exceeded, the texture is unknown, or the last slide was made.
+    /// There is none before the first slide, however few the candidates.
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
         let sure = best.sure && self.slides > 0;
@@ -176,8 +176,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
     }
 
-    /// Log-odds that the texture is none of the candidates, after the slides so far; `None` where the method or the table
-    /// cannot tell.
+    /// Log-odds that the texture is none of the candidates, after the slides so far; `None` where the method or the
+    /// table cannot tell.
     pub fn log_odds(&self) -> Option<f32> {
         self.log_odds
     }
@@ -206,8 +206,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         self.changed_by().is_some_and(|over| over > 0.0)
     }
 
-    /// By how much the slides are less like any of the candidates, as these were learned, than they may be: above 0, the texture
-    /// has [changed](Self::is_changed). `None` before the first slide, and where the table cannot tell.
+    /// By how much the slides are less like any of the candidates, as these were learned, than they may be: above 0,
+    /// the texture has [changed](Self::is_changed). `None` before the first slide, and where the table cannot tell.
     pub fn changed_by(&self) -> Option<f32> {
         let drifts = self.table.drift().is_some_and(|drift| !drift.is_none());
         let limits = self.limits.filter(|_| drifts && self.slides > 0)?;
@@ -235,8 +235,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         least
     }
 
-    /// How much an episode looks like none of the candidates, by the movements made, their slides and the whitened mean of
-    /// these: what the limits of a calibrated table are limits of. `None` where the table is not.
+    /// How much an episode looks like none of the candidates, by the movements made, their slides and the whitened
+    /// mean of these: what the limits of a calibrated table are limits of. `None` where the table is not.
     pub fn score_of(&self, visits: &[(u8, u8, Vector)], against: Against) -> Option<f32> {
         let mut episode = Episode::new();
         for (movement, slides, mean) in visits {
@@ -264,8 +264,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         Some(elsewhere - top as f32 / 65536.0)
     }
 
-    /// Whether the posterior is certain enough for the probe to learn from it by itself. Never by the paper's properties
-    /// alone: one in ten such updates would be wrong.
+    /// Whether the posterior is certain enough for the probe to learn from it by itself. Never by the paper's
+    /// properties alone: one in ten such updates would be wrong.
     pub fn is_certain(&self) -> bool {
         let known = if self.is_calibrated() {
             !self.is_unknown() && !self.is_changed()
@@ -299,7 +299,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         slides.filter(move |v| table.is_whole(v.movement))
     }
 
-    /// The most probable texture as things stand, the first of equals: the answer also where no further slide can be made.
+    /// The most probable texture as things stand, the first of equals: the answer also where no further slide can be
+    /// made.
     pub fn best(&self) -> Verdict {
         let mut best = Verdict {
             texture: 0,
@@ -331,7 +332,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         }
     }
 
-    /// The posterior from its logarithms; the logarithm of the greatest likelihood, and the sum of all in parts of it, Q30.
+    /// The posterior from its logarithms; the logarithm of the greatest likelihood, and the sum of all in parts of it,
+    /// Q30.
     pub(super) fn normalize(&mut self) -> (f32, f32) {
         let (top, sum) = posterior(&self.log, &mut self.posterior);
         (top as f32 / 65536.0, sum)
@@ -343,8 +345,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
     }
 }
 
-/// Computes the posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the greatest of
-/// them, and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
+/// Computes the posterior (eq. 3) from its logarithms, Q16, of which there are as many, at least one. Returns the
+/// greatest of them, and the sum of the probabilities in parts of that one's, Q30. No two logarithms are 2^31 apart.
 #[inline(never)]
 fn posterior(logs: &[i32], posterior: &mut [f32]) -> (i32, f32) {
     let top = logs.iter().copied().max().unwrap_or(0);

@@ -6,8 +6,8 @@ use crate::table::{Numbers, PAIRS};
 /// Degrees of freedom of Student's t in the fused way of deciding.
 pub(super) const DEGREES_OF_FREEDOM: u8 = 8;
 
-/// Student's t of `k` slides against a mean of `n`, whose difference has the variance v = 1/k + 1/n, and along each axis that
-/// of the drift.
+/// Student's t of `k` slides against a mean of `n`, whose difference has the variance v = 1/k + 1/n, and along each
+/// axis that of the drift.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spread {
     /// n.
@@ -73,8 +73,8 @@ impl Spread {
     }
 }
 
-/// Squared distance of two whitened means with a weight for each two numbers, Q32 where the weights are Q16: 54 bits at most.
-/// What is more than 128 standard deviations apart counts as 128.
+/// Squared distance of two whitened means with a weight for each two numbers, Q32 where the weights are Q16: 54 bits
+/// at most. What is more than 128 standard deviations apart counts as 128.
 #[inline]
 pub(super) fn distance(from: &[i16], mean: &[u8], weights: &[u32; PAIRS]) -> u64 {
     let (mean, _) = mean.as_chunks();

@@ -1,8 +1,8 @@
 //! The fused way of deciding: how well the whitened slides of an episode fit each texture, in fixed point.
 //!
-//! At each movement the running mean of the episode's slides is compared with the texture's mean, as Student's t with 8
-//! degrees of freedom. A further slide replaces what the movement said before: adding to it would count the error of the
-//! texture's own mean again with every slide.
+//! At each movement the running mean of the episode's slides is compared with the texture's mean, as Student's t with
+//! 8 degrees of freedom. A further slide replaces what the movement said before: adding to it would count the error of
+//! the texture's own mean again with every slide.
 
 use super::episode::Episode;
 use super::novelty::{NoveltyModel, Source, student_norm};
@@ -10,9 +10,9 @@ use super::spread::{DEGREES_OF_FREEDOM, Spread, distance};
 use crate::dsp::fixed::ln_q16;
 use crate::table::{Contents, Table};
 
-/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of an episode to `logs`;
-/// that of a texture that the table does not have, and whether the table has textures enough to tell it. The drift that the
-/// table expects counts, or not.
+/// Adds the logarithms of the likelihoods (Q16, up to a constant) of all textures after the slides of an episode to
+/// `logs`; that of a texture that the table does not have, and whether the table has textures enough to tell it. The
+/// drift that the table expects counts, or not.
 ///
 /// With a calibrated table, the movements of an episode have one tail together: for that `odds` has space for as many
 /// numbers.
