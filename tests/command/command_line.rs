@@ -837,7 +837,7 @@ fn what_the_command_brings_along_is_what_the_repository_has() {
     // not assert_eq, which would print all bytes
     assert!(contents(&folder) == contents(&here.join("../../shared/tables")));
     let recordings = folder.join("recordings");
-    assert!(contents(&recordings) == contents(&here.join("recordings/simulated")));
+    assert!(contents(&recordings) == contents(&here.join("../recordings/simulated")));
     // once more changes nothing, and a table of somebody's own is left alone
     assert_eq!(printed(&unpack), told);
     let own = folder.join("factory.tact");

@@ -494,7 +494,7 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
     let learned = |labels: &dyn Fn(&str, u32) -> &'static str| {
         let label = |line: &str| {
             // nobody said so far, nor of which finger and at what speed
-            let line = line.rsplitn(5, ',').last().unwrap();
+            let line = line.rsplitn(6, ',').last().unwrap();
             let fields: Vec<&str> = line.split(',').collect();
             let moved = match fields[2].parse() {
                 Ok(slide) => labels(fields[1], slide),

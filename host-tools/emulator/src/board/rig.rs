@@ -268,11 +268,10 @@ impl Rig {
         self.advance_to(now_ns);
         // a port's level does not swing
         let by_timer = self.wave.filter(|_| self.duty_port.is_none());
-        let counts = match by_timer.and_then(|wave| wave.phase(now_ns)) {
+        match by_timer.and_then(|wave| wave.phase(now_ns)) {
             Some(phase) => self.world.motor_adc_within(phase),
             None => self.world.motor_adc(),
-        };
-        counts
+        }
     }
 
     /// PWM as an output of its port; `None` leaves it to the timer.
