@@ -10,6 +10,7 @@ pub(crate) mod lever;
 pub(crate) mod motion;
 pub(crate) mod rescue;
 mod select;
+mod slot_plan;
 pub(crate) mod slots;
 mod spi;
 mod store_place;

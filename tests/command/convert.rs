@@ -134,7 +134,7 @@ fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
         .filter_map(|line| {
             Some((
                 line.get("report")?["at_ms"].as_u64()?,
-                &line["report"]["tell"],
+                &line["report"]["event"],
             ))
         })
         .collect();
@@ -177,7 +177,7 @@ fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
         last["all"][verdict["name"].as_str().unwrap()],
         last["probability"]
     );
-    let asked = lines.iter().filter(|line| line.get("ask").is_some());
+    let asked = lines.iter().filter(|line| line.get("command").is_some());
     assert_eq!(found["/request"].len(), asked.count());
 }
 

@@ -919,7 +919,7 @@ fn a_port_without_a_probe_is_an_error_that_says_what_to_do() {
         &["port", "open it again"],
     );
     let booted = says(&[|| Event::Booted {
-        protocol: 1,
+        protocol: 2,
         version: Default::default(),
         reset: Reset::Power,
         last_words: None,
@@ -927,7 +927,7 @@ fn a_port_without_a_probe_is_an_error_that_says_what_to_do() {
     }]);
     assert_says(
         &complaint(&["status", "--port", &booted]),
-        &["version 1", "tactus device flash"],
+        &["version 2", "tactus device flash"],
     );
     // whole frames with a message that nobody knows
     let foreign = line(|mut stream| {

@@ -296,7 +296,7 @@ fn a_page_asks_to_move_the_sample_where_the_command_does() {
     assert_eq!(recorded.failed, None, "{}", recorded.said);
     let manifest = recorded.folders[0]["files"].as_array().unwrap().last();
     let manifest = String::from_utf8(bytes(manifest.unwrap())).unwrap();
-    let of_slide = |row: &str| row.rsplit(',').nth(3).unwrap().to_owned();
+    let of_slide = |row: &str| row.rsplit(',').nth(4).unwrap().to_owned();
     let moved: Vec<String> = manifest.lines().skip(1).map(of_slide).collect();
     assert_eq!(moved, ["no"; 4], "{manifest}");
 }

@@ -43,8 +43,8 @@ pub struct Reset {
     pub cause: ResetCause,
 }
 
-/// A board that runs an ELF, with the rig on its pins. It stands except in [`Emulator::run_until`] and its like. Access
-/// to the chip is an error once the run is over ([`Error::Ended`]).
+/// A board that runs an ELF, with the rig on its pins. It runs only in [`Emulator::run_until`] and its like.
+/// Access to the chip is an error once the run is over ([`Error::Ended`]).
 pub struct Emulator {
     rig: SharedRig,
     commands: Option<Sender<Command>>,

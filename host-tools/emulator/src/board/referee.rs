@@ -22,11 +22,9 @@ use accelerator::Accelerator;
 use converter::Converters;
 use vendor::{Vendor, Word};
 
-/// Status registers that are cleared by zeros (rc_w0). The vendor's own library writes ones to all else in them,
-/// reserved bits too.
+/// Status registers cleared by zeros (rc_w0). The vendor's library writes ones to their other bits, reserved ones too.
 const CLEARED_BY_ZEROS: [(&str, &str); 3] = [("timer", "SR"), ("usart", "SR"), ("i2c", "SR1")];
-/// Data registers take bytes, though the manual asks for half-words: the vendor's own library and embassy write them
-/// so.
+/// Data registers take bytes, though the manual asks for half-words: the vendor's library and embassy write bytes.
 const DATA: &str = "DR";
 
 /// Kinds of peripherals whose registers are written by half-words or words (RM0090 12.3, 13.13, 17.4, 21.4, 27.6,
