@@ -17,9 +17,7 @@ use embassy_stm32::{Peri, peripherals, rcc};
 use heapless::spsc::Producer;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{Answer, Port, Transaction};
-use tactus_core::sensor::{
-    AnyFinger, BadWord, FingerError, FingerName, FingerParts, GRAVITY_PARTS,
-};
+use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerParts, GRAVITY_PARTS};
 
 use crate::board::{self, held};
 use crate::chip::select::Select;

@@ -1,5 +1,4 @@
 //! The emulator's interface for its users.
-
 use std::ops::Range;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
