@@ -76,7 +76,7 @@ impl Likeness {
         Self {
             fewer,
             octaves: 2 * LOG2_E / (n + 1) * n,
-            far: u64::from(far * (n + 1) / n & !1),
+            far: u64::from((far * (n + 1) / n) & !1),
         }
     }
 

@@ -30,7 +30,9 @@ fn name_of(name: &str) -> Result<Name> {
 /// Does what is asked for; then the page knows the table in use.
 pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Result<()> {
     match work {
-        Work::Status => drop(operations::status(probe).await?),
+        Work::Status => {
+            operations::status(probe).await?;
+        }
         Work::Home => operations::home(probe).await?,
         Work::Identify {
             threshold,
@@ -49,8 +51,12 @@ pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Res
             };
             here::identify(probe, wanted, |_| ()).await?;
         }
-        Work::Teach { name } => drop(here::teach(probe, &name).await?),
-        Work::Train(training) => drop(here::train(probe, &training).await?),
+        Work::Teach { name } => {
+            here::teach(probe, &name).await?;
+        }
+        Work::Train(training) => {
+            here::train(probe, &training).await?;
+        }
         Work::Verify {
             name,
             threshold,
@@ -82,8 +88,12 @@ pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Res
             operations::forget(probe, Forget::Training(name_of(&name)?)).await?;
         }
         Work::ForgetSelfLearned => operations::forget(probe, Forget::SelfLearned).await?,
-        Work::Factory => drop(operations::factory(probe).await?),
-        Work::Settings => drop(operations::settings(probe).await?),
+        Work::Factory => {
+            operations::factory(probe).await?;
+        }
+        Work::Settings => {
+            operations::settings(probe).await?;
+        }
         Work::FalseAlarm { share } => {
             operations::set_false_alarm(probe, share).await?;
             operations::settings(probe).await?;
@@ -93,7 +103,9 @@ pub(super) async fn work(probe: &Probe, work: Work, kept: &RefCell<Kept>) -> Res
             operations::settings(probe).await?;
         }
         Work::Pull => pull(probe, kept).await?,
-        Work::Push { file, bytes } => drop(operations::push(probe, &file, &bytes).await?),
+        Work::Push { file, bytes } => {
+            operations::push(probe, &file, &bytes).await?;
+        }
     }
     probe.table().await?;
     Ok(())
