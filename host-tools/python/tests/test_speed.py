@@ -10,7 +10,7 @@ from test_recordings import of_numpy
 
 import tactus
 
-sys.path.insert(0, str(pathlib.Path(ROOT, "tests/oracle")))
+sys.path.insert(0, str(pathlib.Path(ROOT, "tests/core/oracle")))
 import evaluate as in_numpy  # noqa: E402
 
 
