@@ -182,7 +182,7 @@ fn own_manifest_errors_name_line_and_column() {
             ],
         ),
         (
-            ",4,1.260,",
+            ",4,0.502,",
             ",4,,",
             ["manifest.csv:3: column force_n", "\"\" is not a number"],
         ),
