@@ -3,13 +3,13 @@
 use std::sync::OnceLock;
 
 use embassy_futures::block_on;
-use tactus_lab::eval::learn::learn;
-use tactus_lab::sim::flash::RamFlash;
 use tactus_core::explorer::Method;
 use tactus_core::features::{FeatureSet, Movement, Observation, Properties};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::store::Store;
+use tactus_lab::eval::learn::learn;
+use tactus_lab::sim::flash::RamFlash;
 
 /// Bytes of the smallest sector: a sixteenth of the chip's, so that they fill up.
 pub(crate) const SECTOR: usize = 1024;

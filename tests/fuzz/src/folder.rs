@@ -7,10 +7,10 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use sha2::{Digest as _, Sha256};
-use tactus_study::fabricslide::FabricSet;
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::data::recordings::{RecordingError, RecordingSet};
 use tactus_lab::eval::experiment::Experiment;
+use tactus_study::fabricslide::FabricSet;
 
 /// Between manifest and file.
 const RULE: &[u8] = b"\n---\n";

@@ -15,7 +15,6 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use embassy_futures::block_on;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use tactus_lab::eval::learn::know_lengths;
 use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{FUSED_BANDS, Observation, Properties};
 use tactus_core::probe::teach::put_in_force;
@@ -23,6 +22,7 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{SelfLearnedRecord, Store};
 use tactus_core::table::{Change, Table, amend};
 use tactus_core::wire::{Command, Event, MAX_FRAME, Receiver, Request};
+use tactus_lab::eval::learn::know_lengths;
 
 pub use flash::{Flash, images};
 pub use folder::recordings;
