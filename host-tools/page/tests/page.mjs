@@ -25,7 +25,7 @@ const ALL_S = Number(process.env.TACTUS_PAGE_LIMIT_S ?? 360 * SLOW), TEST_S = 15
 function module() {
   const instance = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(wasm)), {});
   const { request, ask, reply, world, memory } = instance.exports;
-  const trials = readFileSync(new URL("../../src/live/world-1.trials", import.meta.url));
+  const trials = readFileSync(new URL("../../lab/src/live/world-1.trials", import.meta.url));
   // the memory may grow
   const at = request(trials.length);
   trials.copy(Buffer.from(memory.buffer, at, trials.length));
