@@ -25,6 +25,7 @@ pub struct NewSlide {
     pub features: Vec<i16>,
 }
 
+/// A table that was moved by new slides.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Refreshed {
     /// The table.

@@ -40,6 +40,7 @@ pub struct Report {
     pub advice: Vec<String>,
 }
 
+/// A texture of the table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TextureReport {
     /// Its name.

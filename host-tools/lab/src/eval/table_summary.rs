@@ -25,15 +25,19 @@ pub struct TableSummary {
     false_alarm: Option<f32>,
     /// Lengths of shorter slides that it has statistics of, s at constant speed.
     pub(crate) lengths_s: Vec<f64>,
-    pub(super) movements: Vec<MovementSummary>,
+    /// The movements.
+    pub movements: Vec<MovementSummary>,
     /// The textures, in the order of the table.
     pub(super) textures: Vec<TextureSummary>,
 }
 
+/// A movement of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub(crate) struct MovementSummary {
-    force_n: f32,
-    speed_mm_s: f32,
+pub struct MovementSummary {
+    /// Contact force.
+    pub force_n: f32,
+    /// Speed.
+    pub speed_mm_s: f32,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
