@@ -183,20 +183,17 @@ fn evaluate<'py>(
 fn leave_out<'py>(
     py: Python<'py>,
     recordings: From,
-    left_out: usize,
     arguments: Arguments,
 ) -> PyResult<Bound<'py, PyAny>> {
     let Asks { experiment, asked } = Asks::fused(py, &recordings, &arguments)?;
-    // a texture that is known is presented while others are left out, and limits take three
-    let least = (2 * left_out).max(3 + left_out);
-    if left_out == 0 || experiment.names().len() < least {
-        return Err(PyValueError::new_err(format!(
-            "--novelty needs {least} textures or more to leave out {left_out}: record more of them"
-        )));
+    if experiment.names().len() < 4 {
+        return Err(PyValueError::new_err(
+            "--novelty needs 4 textures or more: record more of them",
+        ));
     }
     let EvaluationRequest { config, runs, .. } = asked;
     let figures = work(py, |between| {
-        novelty::leave_out(&experiment, config, left_out, runs, between)
+        novelty::leave_one_out(&experiment, config, runs, between)
     })?;
     object(py, &figures)
 }

@@ -107,15 +107,15 @@ def evaluate(recordings, **arguments):
     return _tactus.evaluate(recordings, _arguments(arguments))
 
 
-def novelty(recordings, left_out=1, **arguments):
+def novelty(recordings, **arguments):
     """Leave textures out of the table in turn, and count how they are noticed, as `tactus evaluate --novelty leave-one-out`.
 
-    left_out: textures that are left out together. Other arguments, results and errors as of `evaluate`; method "fused" only.
+    Arguments, results and errors as of `evaluate`; method "fused" only.
 
     Returns a dict: `novelty`, a list by slides (1, 2, 3) of shares told of `known` and of `unknown` textures; `verdicts_new` and
     `verdicts_known`, what users are told in the end.
     """
-    return _tactus.leave_out(recordings, left_out, _arguments(arguments))
+    return _tactus.leave_out(recordings, _arguments(arguments))
 
 
 def evaluate_verify(recordings, **arguments):

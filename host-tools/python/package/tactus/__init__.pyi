@@ -187,7 +187,6 @@ def evaluate(
 ) -> Dict[str, Any]: ...
 def novelty(
     recordings: Union[Recordings, Properties],
-    left_out: int = 1,
     *,
     protocol: str = "interleaved",
     train_slides: Optional[int] = None,

@@ -46,7 +46,6 @@ Examples:
   tactus evaluate --recordings DIR --protocol drift
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
-  tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --fabrics DIR
   tactus evaluate --recordings DIR --verify --protocol blocked")]
@@ -74,9 +73,6 @@ pub(crate) struct Args {
     /// Count how textures that were not learned are noticed
     #[arg(long, value_enum, conflicts_with = "plot")]
     pub(crate) novelty: Option<Novelty>,
-    /// With --novelty: textures that are left out of a table together
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "novelty", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) left_out: u16,
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with = "novelty")]
     pub(crate) verify: bool,
