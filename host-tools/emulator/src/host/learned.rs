@@ -122,7 +122,7 @@ impl Chosen {
             hex_sha256(&std::fs::read(&program).ok()?),
         );
         let name = &hex_sha256(key.as_bytes())[..16];
-        // target/emulator/release/tactus-emulator
+        // target/debug/tactus-emulator
         let folder = program.parent()?.join("learned");
         Some(folder.join(format!("{name}.tact")))
     }

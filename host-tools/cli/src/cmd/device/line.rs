@@ -159,7 +159,7 @@ impl Drop for Emulator {
 
 impl Emulator {
     fn start(options: &Where) -> Result<Self, OpenError> {
-        let program = "emulator/release/tactus-emulator";
+        let program = "debug/tactus-emulator";
         let program = built("the emulator", "TACTUS_EMULATOR", &[program])?;
         let elf = built(
             "the firmware",
