@@ -6,7 +6,6 @@ mod convert;
 mod device;
 mod examples;
 mod kills;
-mod opened;
 mod output;
 mod study;
 mod verdicts;

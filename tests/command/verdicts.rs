@@ -186,25 +186,6 @@ fn identify_ends_when_the_recordings_run_out() {
     assert_eq!(measured.len(), slides, "no slide comes twice: {shown}");
 }
 
-#[test]
-fn a_lifelong_session_is_played_as_often_as_asked() {
-    let Some(folder) = data("biotac") else { return };
-    for runs in ["2", "60"] {
-        let figures = printed(&[
-            "evaluate",
-            "--recordings",
-            path(&folder),
-            "--lifelong",
-            "--runs",
-            runs,
-            "--format",
-            "json",
-        ]);
-        let figures: serde_json::Value = serde_json::from_str(&figures).unwrap();
-        assert_eq!(figures["sessions"].to_string(), runs);
-    }
-}
-
 /// A table of properties as it comes from a rig, where no number of trials is like another.
 #[test]
 fn numbers_of_trials_may_differ() {

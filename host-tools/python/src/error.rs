@@ -8,9 +8,7 @@ use pyo3::prelude::*;
 use tactus_core::explorer::{ExplorerError, ObserveError};
 use tactus_core::features::{MovementError, SlideError as OfSlide};
 use tactus_core::table::TableError as OfTable;
-use tactus_lab::data::properties::PropertyError;
 use tactus_lab::data::recordings::RecordingError as OfRecordings;
-use tactus_lab::data::replay::MeasureError;
 use tactus_lab::data::table_file::TableFileError;
 use tactus_lab::eval::evaluate::EvaluateError;
 use tactus_lab::eval::experiment::ExperimentError;
@@ -106,8 +104,6 @@ macro_rules! raise {
 
 raise! {
     OfRecordings => RecordingError,
-    MeasureError => RecordingError,
-    PropertyError => RecordingError,
     MovementError => SlideError,
     OfSlide => SlideError,
     OfTable => TableError,

@@ -11,8 +11,8 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
-use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::{MeasureError, MeasuredSlide, measure, measure_all};
+use tactus_lab::data::recordings::{RecordingError, RecordingSet};
+use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all};
 
 use crate::error::Raise as _;
 use crate::features::{Features, plan};
@@ -106,7 +106,7 @@ impl Recordings {
 
 /// Why a folder cannot be measured, with its name as the command line has it.
 #[derive(Debug)]
-struct Measuring(String, Box<MeasureError>);
+struct Measuring(String, Box<RecordingError>);
 
 impl std::fmt::Display for Measuring {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

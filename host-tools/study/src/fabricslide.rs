@@ -46,7 +46,6 @@ pub use error::{FabricError, MANIFEST};
 pub use features::{BAND_EDGES, TAXELS};
 use features::{Meter, ROW_BYTES};
 use manifest::{Entry, Manifest};
-use tactus_lab::data::content::ContentError;
 use tactus_lab::data::recordings::files;
 use tactus_lab::eval::experiment::{Experiment, ExperimentError};
 
@@ -97,7 +96,7 @@ impl FabricSet {
     /// See [`ExperimentError`].
     pub fn experiment(&self, learned_from: u8, seed: u64) -> Result<Experiment, ExperimentError> {
         if self.movements.len() > table::MAX_MOVEMENTS {
-            return Err(ExperimentError::Movements(self.movements.len()));
+            return Err(ExperimentError::movements(self.movements.len()));
         }
         let observation = |s: &FabricSlide| Observation {
             properties: Properties::new(s.properties.map(Some)),
@@ -184,12 +183,15 @@ impl Entry {
         meter: &Meter,
         raw: &[u8],
         key: manifest::Key,
-    ) -> Result<std::array::IntoIter<features::SlideSpectrum, CUTS>, ContentError> {
-        let rows = self.rows(key).ok_or(ContentError::NoRecording)?;
+    ) -> Result<std::array::IntoIter<features::SlideSpectrum, CUTS>, String> {
+        let rows = self
+            .rows(key)
+            .ok_or("the manifest lists no such recording")?;
         let mut observed = [features::SlideSpectrum::default(); CUTS];
         for (observed, slide) in observed.iter_mut().zip(cut(&rows)) {
             let bytes = raw.get(slide.start * ROW_BYTES..slide.end * ROW_BYTES);
-            *observed = meter.measure(bytes.ok_or(ContentError::Ends)?)?;
+            *observed =
+                meter.measure(bytes.ok_or("ends before this recording; fetch it again")?)?;
         }
         Ok(observed.into_iter())
     }

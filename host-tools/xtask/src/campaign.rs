@@ -94,7 +94,7 @@ enum Part {
     Verify,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
     Press,
-    /// libFuzzer against frames, tables, the store's flash, recordings and scenarios, on stable Rust; wants a C++
+    /// libFuzzer against frames, tables, the store's flash and recordings, on stable Rust; wants a C++
     /// compiler
     Fuzz,
     /// The same with a bug planted in each target, which must be found

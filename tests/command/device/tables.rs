@@ -1,5 +1,7 @@
 //! `tactus device table`.
 
+use tactus_core::sensor::FingerName;
+
 use super::*;
 
 #[test]
@@ -109,7 +111,8 @@ fn a_table_that_is_longer_than_a_small_sector_is_used_and_added_to() {
     let temp = tempfile::tempdir().unwrap();
     let [long, pulled, slides] = ["long", "pulled", "slides"].map(|name| temp.path().join(name));
     let movements: Vec<Movement> = Movement::grid().take(24).collect();
-    let table = world().learn_at(&movements, Method::Fused, known().0, || ());
+    let (finger, fused) = (FingerName::Biotac, (Method::Fused, None));
+    let table = world().learn_with(finger, &movements, fused, known().0, || ());
     let table = table.unwrap();
     assert!(
         table.len() > SECTOR && table.len() < TABLE,

@@ -9,7 +9,6 @@
 
 mod flash;
 mod folder;
-mod played;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use embassy_futures::block_on;
@@ -26,7 +25,6 @@ use tactus_lab::eval::learn::know_lengths;
 
 pub use flash::{Flash, images};
 pub use folder::recordings;
-pub use played::{another_scenario, scenario};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// More textures than any table for the probe has.
@@ -387,7 +385,6 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             .map(|image| vec![image, 1, 0, 9, 4, 0, 3, 2, 1, 3, 7, 1, 0, 6, 0, 4, 0])
             .collect(),
         "recordings" => folder::seeds(),
-        "scenario" => played::seeds(),
         other => panic!("no target {other}"),
     }
 }

@@ -6,7 +6,6 @@ use anyhow::ensure;
 use clap::ValueEnum as _;
 use tactus_core::explorer;
 use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
-use tactus_lab::eval::experiment::Protocol;
 use tactus_lab::eval::show::count;
 use tactus_study::pictures::evaluation::figures;
 
@@ -20,25 +19,14 @@ mod verify;
 
 /// Plays the explorations that the arguments ask for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    if args.lifelong && args.protocol != Protocol::Drift {
-        // the first slides are learned from, all others come after them
-        let drift = Args {
-            protocol: Protocol::Drift,
-            ..args.clone()
-        };
-        return run(&drift, out);
-    }
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
-        is_fused || !args.lifelong && !args.verify && args.novelty.is_none(),
-        "--novelty, --verify and --lifelong need --method fused: the other methods do not recognise new textures"
+        is_fused || !args.verify && args.novelty.is_none(),
+        "--novelty and --verify need --method fused: the other methods do not recognise new textures"
     );
     let canvas = args.plot.open()?;
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
-    if args.lifelong {
-        return novelty::lifelong(args, &experiment, config, out);
-    }
     if args.verify {
         return verify::run(args, &experiment, protocol, config, canvas, out);
     }

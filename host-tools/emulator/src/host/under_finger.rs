@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
-use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::recordings::{RecordingError, RecordingSet};
 use tactus_lab::sim::collection::{Collection, LearnError, calibrated, texture_name};
-use tactus_lab::sim::recorded::{PlayError, RecordedTexture};
+use tactus_lab::sim::recorded::RecordedTexture;
 use tactus_world::played::Played;
 use tactus_world::world::Setup;
 
@@ -32,7 +32,7 @@ pub enum KnownError {
     NoData(PathBuf),
     /// They cannot be played.
     #[error(transparent)]
-    Play(#[from] PlayError),
+    Play(#[from] RecordingError),
     /// The simulated rig failed.
     #[error(transparent)]
     Learn(#[from] LearnError),
@@ -110,7 +110,7 @@ pub fn simulated_with(
     let setup = collection.setup_with(finger, first, 0);
     let calibration = calibrated(setup).map_err(LearnError::from)?;
     let movements = &Collection::MOVEMENTS;
-    let table = collection.learn_with(finger, movements, method, calibration, done)?;
+    let table = collection.learn_with(finger, movements, (method, None), calibration, done)?;
     Ok(FirmwareData { calibration, table })
 }
 
@@ -166,7 +166,7 @@ pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownErr
     if !folder.is_dir() {
         return Err(KnownError::NoData(folder));
     }
-    let set = RecordingSet::open(&folder).map_err(PlayError::from)?;
+    let set = RecordingSet::open(&folder)?;
     Ok(RecordedTexture::interleaved(
         &set,
         recorded_trials(method),

@@ -17,7 +17,7 @@ pub struct Alike {
     /// Share of slides of the one that would be taken for the other's, were these two the only ones, at the movement
     /// that tells them apart best. 0 where they never are, 0.5 where it is a guess; more where the other was learned
     /// from more slides.
-    pub taken_for: f64,
+    pub(crate) taken_for: f64,
     /// Contact force of that movement.
     pub force_n: f32,
     /// Its speed.
@@ -52,7 +52,6 @@ pub fn alike(table: Table<'_>, texture: u16, other: u16) -> Option<Alike> {
     })
 }
 
-/// Two textures at one movement.
 struct Apart {
     movement: u8,
     /// Squared distance of the means, in variances of a slide, over all features.

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use tactus_lab::data::content::ContentError;
 use tactus_lab::data::recordings::files::RecordingError;
 
 /// Name of the manifest.
@@ -44,7 +43,7 @@ pub enum FabricError {
         /// As in the manifest.
         repetition: u8,
         /// The fault, and its remedy.
-        cause: ContentError,
+        cause: String,
     },
     /// A file cannot be read or differs from its manifest.
     #[error(transparent)]

@@ -5,8 +5,6 @@ use std::sync::Arc;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
-use tactus_lab::data::content::ContentError;
-
 /// Taxels of the finger: values in a row.
 pub const TAXELS: usize = 16;
 /// Bins of the eight bands, half-open, in the spectrum of 256 samples.
@@ -58,17 +56,22 @@ impl Meter {
     ///
     /// # Errors
     /// The slide is too short, or no taxel moves.
-    pub(super) fn measure(&self, rows: &[u8]) -> Result<SlideSpectrum, ContentError> {
+    pub(super) fn measure(&self, rows: &[u8]) -> Result<SlideSpectrum, String> {
         let samples = rows.len() / ROW_BYTES;
         if samples < SHORTEST {
-            return Err(ContentError::Short(samples, SHORTEST));
+            return Err(format!(
+                "a slide of {samples} samples is too short, {SHORTEST} are the least; record it again or take this \
+                 movement out of the manifest"
+            ));
         }
         let taxels: [Vec<f64>; TAXELS] = std::array::from_fn(|t| detrended(rows, t));
         let variances = taxels
             .each_ref()
             .map(|taxel| taxel.iter().map(|x| x * x).sum::<f64>() / samples as f64);
         if variances.iter().all(|v| *v < FLAT) {
-            return Err(ContentError::Silent);
+            let why = "no taxel moves: the finger did not touch, or the sensor is dead; record it again or take this movement \
+                       out of the manifest";
+            return Err(why.to_owned());
         }
         let spectrum = self.spectrum(&taxels);
         let ln_bands = std::array::from_fn(|b| {

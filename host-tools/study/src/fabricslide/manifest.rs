@@ -12,7 +12,6 @@ use tactus_core::features::Movement;
 
 use super::error::FabricError;
 use super::features::TAXELS;
-use tactus_lab::data::content::ContentError;
 use tactus_lab::data::recordings::files::{self, RecordingError};
 
 /// Most bytes of samples of one fabric: it is read into memory as a whole, and all fabrics at once.
@@ -93,25 +92,32 @@ impl Manifest {
     /// # Errors
     /// If it cannot be read, is no such manifest, or contradicts itself.
     pub(super) fn read(path: &Path) -> Result<Self, RecordingError> {
-        let fault = |place: String, cause| RecordingError::Entry {
-            path: path.to_owned(),
-            place,
-            cause,
-        };
+        let fault =
+            |place: String, cause: String| RecordingError::at(path, format!("{place}: {cause}"));
         let bytes = files::read_bounded(path, files::MAX_MANIFEST)?;
         let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
             let place = format!("line {}, column {}", e.line(), e.column());
-            fault(place, ContentError::Json(e, "data/fabricslide"))
+            fault(
+                place,
+                format!("{e}; the layout is that of data/fabricslide"),
+            )
         })?;
         if json.files.is_empty() {
-            return Err(fault("files".to_owned(), ContentError::NoFabric));
+            return Err(fault(
+                "files".to_owned(),
+                "no fabric is listed; list some".to_owned(),
+            ));
         }
         let mut names = HashSet::new();
         let mut fabrics = Vec::new();
         for file in json.files {
             let place = format!("files, {}", file.file);
             if !names.insert(file.fabric.clone()) {
-                return Err(fault(place, ContentError::SecondFile(file.fabric)));
+                let why = format!(
+                    "a second file of the fabric {:?}; give each fabric one file and one name",
+                    file.fabric
+                );
+                return Err(fault(place, why));
             }
             fabrics.push(Entry::of(file).map_err(|(slide, cause)| match slide {
                 None => fault(place, cause),
@@ -152,11 +158,10 @@ impl Manifest {
         }
         let movements = grid.iter().map(|action| {
             Movement::try_from((action.setpoint, action.speed_um_s)).map_err(|e| {
-                RecordingError::Entry {
-                    path: self.path.clone(),
-                    place: action.to_string(),
-                    cause: ContentError::Setpoint(e),
-                }
+                let cause = format!(
+                    "{action}: {e} (the set-point stands in place of the force); take this movement out of the manifest"
+                );
+                RecordingError::at(&self.path, cause)
             })
         });
         Ok(Shared {
@@ -242,9 +247,12 @@ impl fmt::Display for Action {
 
 impl Entry {
     /// Checks the recordings of a file; an error is the number of the recording, if it is one's, and the cause.
-    fn of(file: File) -> Result<Self, (Option<usize>, ContentError)> {
+    fn of(file: File) -> Result<Self, (Option<usize>, String)> {
         if file.slides.is_empty() || file.slides.len() > MAX_RECORDINGS {
-            let cause = ContentError::SlideCount(file.slides.len(), MAX_RECORDINGS);
+            let cause = format!(
+                "the slides listed are {}, and 1 to {MAX_RECORDINGS} can be: add some, or split the file",
+                file.slides.len()
+            );
             return Err((None, cause));
         }
         let mut recordings = HashMap::new();
@@ -259,7 +267,10 @@ impl Entry {
             }
             .of(slide.direction, slide.rep);
             if slide.rep > 1 {
-                return Err(fault(ContentError::Repetition(slide.rep)));
+                return Err(fault(format!(
+                    "rep is {}; the two repetitions are 0 and 1: correct the manifest",
+                    slide.rep
+                )));
             }
             let end = slide
                 .n
@@ -267,7 +278,13 @@ impl Entry {
                 .and_then(|values| values.checked_add(slide.offset_values))
                 .filter(|end| *end <= MAX_RAW / 2);
             let Some(end) = end.filter(|_| slide.n > 0) else {
-                let cause = ContentError::Span(slide.n, slide.offset_values, MAX_RAW / 2);
+                let cause = format!(
+                    "the rows, {} of 16 values from value {} on: a recording has 1 row at least, and a file no more than \
+                     {} values; correct the manifest",
+                    slide.n,
+                    slide.offset_values,
+                    MAX_RAW / 2
+                );
                 return Err(fault(cause));
             };
             // below MAX_RAW, so usize holds them
@@ -275,18 +292,22 @@ impl Entry {
             spans.push((slide.offset_values, end, index));
             let rows = row(slide.offset_values)..row(end);
             if recordings.insert(key, rows).is_some() {
-                return Err(fault(ContentError::RecordingTwice {
-                    movement: key.action.to_string(),
-                    direction: key.direction,
-                    repetition: key.repetition,
-                }));
+                return Err(fault(format!(
+                    "{}, direction {}, rep {} is listed twice; correct the manifest",
+                    key.action, key.direction, key.repetition
+                )));
             }
         }
         spans.sort_unstable();
         let mut bytes_raw = 0;
         for (start, end, index) in spans {
             if start != bytes_raw / 2 {
-                return Err((Some(index), ContentError::Gap(start, bytes_raw / 2)));
+                let why = format!(
+                    "offset_values is {start}, but the recording before it ends at {}; recordings follow each other without \
+                     gap or overlap: correct the manifest",
+                    bytes_raw / 2
+                );
+                return Err((Some(index), why));
             }
             bytes_raw = end * 2;
         }
@@ -308,10 +329,11 @@ impl Entry {
     /// All samples of the file, hashes checked before and after decompression.
     pub(super) fn samples(&self, path: &Path) -> Result<Vec<u8>, RecordingError> {
         if !path.is_file() {
-            return Err(RecordingError::Samples {
-                path: path.to_owned(),
-                cause: ContentError::NoSamples(self.name.clone()),
-            });
+            let cause = format!(
+                "no such file, but the manifest names it; fetch it, or take {} out of the manifest",
+                self.name
+            );
+            return Err(RecordingError::at(path, cause));
         }
         // twice the raw size is more than gzip ever needs
         let packed = files::read_bounded(path, self.bytes_raw * 2 + 4096)?;

@@ -11,7 +11,7 @@ use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain;
 
 /// The binaries of tests/fuzz.
-const TARGETS: [&str; 5] = ["wire", "table", "store", "recordings", "scenario"];
+const TARGETS: [&str; 4] = ["wire", "table", "store", "recordings"];
 /// Longest input, bytes.
 const MAX_LEN: usize = 8192;
 

@@ -16,7 +16,6 @@ use tactus_core::wire::{Event, Report, SlideReport};
 use tactus_lab::data::recording::PAC_RATE_HZ;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::measure;
-use tactus_lab::remote::mcap::TABLE;
 
 use super::{To, create};
 use crate::cmd::device::log::{self, Line, TableParts};
@@ -200,7 +199,7 @@ impl Writer {
         Ok(self.mcap.attach(&Attachment {
             log_time: at_ns,
             create_time: at_ns,
-            name: TABLE.to_owned(),
+            name: "table.tact".to_owned(),
             media_type: "application/octet-stream".to_owned(),
             data: table.into(),
         })?)

@@ -21,10 +21,9 @@ use tactus_world::person::{Hand, Manner};
 use tactus_world::slot::Reader;
 use tactus_world::world::Setup;
 
-/// Largest force that the finger ever bears, N.
 const MOST_N: f64 = 2.2;
 /// Seeds of each finger.
-const SEEDS: u64 = 5;
+const SEEDS: u64 = 2;
 
 /// A person at a rig who follows its prompts, without a tremor: a weight lies on the finger.
 struct Weights {
@@ -34,7 +33,6 @@ struct Weights {
     state: RigState,
 }
 
-/// A rig that knows its finger in the air.
 fn calibrated(finger: FingerName, seed: u64, broken: Option<PartFault>) -> SimRig {
     let mut rig = SimRig::new(Setup {
         texture: 1 + (seed * 37 % 117) as u8,
@@ -54,7 +52,6 @@ fn calibrated(finger: FingerName, seed: u64, broken: Option<PartFault>) -> SimRi
     rig
 }
 
-/// Every finger with each of the seeds.
 fn each(seeds: u64, run: impl Fn(FingerName, u64) + Sync) {
     let all = FingerName::ALL.into_iter();
     let all: Vec<_> = all
@@ -153,7 +150,6 @@ fn weights_on_the_lifted_finger_give_its_force_per_count() {
         });
         let weighed = ForceScale::of(&points);
         let weighed = weighed.unwrap_or_else(|| panic!("{finger}, {seed}: {points:?}"));
-        println!("{finger}, {seed}: {weighed:?}");
         let model = Reader::new(finger).model().calibration;
         let share = weighed.mn_per_count / model.force_mn_per_count;
         assert!((share - 1.0).abs() < 0.03, "{finger}, {seed}: {weighed:?}");
@@ -225,7 +221,7 @@ fn turned(seed: u64, lean_rad: f64) -> (Result<Turned, Failure>, [f64; 2]) {
 
 #[test]
 fn an_accelerometer_that_is_turned_over_says_what_a_count_is() {
-    (1..=50u64).into_par_iter().for_each(|seed| {
+    (1..=10u64).into_par_iter().for_each(|seed| {
         // it stands on something
         let (turned, [g, zero]) = turned(seed, 0.02);
         let turned = turned.unwrap_or_else(|why| panic!("{seed}: {why}"));
@@ -254,11 +250,6 @@ fn a_hand_that_leans_measures_a_little_less() {
     let each: Vec<Option<f64>> = each.collect();
     let kept: Vec<f64> = each.iter().flatten().copied().collect();
     let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-    println!(
-        "{} of 50 kept, {:.1} % on average",
-        kept.len(),
-        100.0 * mean
-    );
     assert!(
         kept.len() >= 40 && mean > -0.05,
         "{} kept, {mean}",
