@@ -10,14 +10,12 @@ use tactus_core::sensor::FingerName;
 use tactus_lab::data::recording::Recording;
 use tactus_lab::data::recordings::RecordingError;
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name, texture_number};
-use tactus_lab::sim::handheld::learn_with;
 use tactus_lab::sim::rig::SimRig;
 use tactus_world::textures::TEXTURES;
 
 use crate::error::Raise as _;
 use crate::features::movement;
 use crate::recordings::Slide;
-use crate::table::Table;
 use crate::work::work;
 
 /// A simulated rig with a texture under its finger.
@@ -177,29 +175,9 @@ fn simulate<'py>(
     Ok(all)
 }
 
-/// Learns a handheld probe's table from slides of a simulated hand, as `tactus learn-by-hand` does, byte for byte: the `Table`,
-/// and the names of textures without enough good slides, which are not in it.
-///
-/// Arguments and errors as of `simulate`; trials: slides of each texture.
-#[pyfunction]
-#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
-fn learn_by_hand(
-    py: Python<'_>,
-    textures: Option<Vec<String>>,
-    trials: u32,
-    seed: u64,
-    finger: &str,
-) -> PyResult<(Table, Vec<&'static str>)> {
-    let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
-    let (bytes, left_out) = work(py, |between| learn_with(finger, &collection, between))?;
-    let left_out = left_out.into_iter().map(texture_name).collect();
-    Ok((Table::of(bytes)?, left_out))
-}
-
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let names: Vec<&str> = TEXTURES.iter().map(|texture| texture.name).collect();
     module.add("TEXTURES", names)?;
     module.add_class::<SimulatedRig>()?;
-    module.add_function(wrap_pyfunction!(simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(learn_by_hand, module)?)
+    module.add_function(wrap_pyfunction!(simulate, module)?)
 }

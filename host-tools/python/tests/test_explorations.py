@@ -106,13 +106,6 @@ def test_simulated_slides_are_the_commands(command, tmp_path):
                 np.testing.assert_array_equal(getattr(our, samples), getattr(their, samples))
 
 
-def test_a_handhelds_table_is_the_commands(command, tmp_path):
-    command("learn-by-hand", "--out", tmp_path / "hand", "--textures", ",".join(THREE), "--trials", 3)
-    table, left_out = tactus.learn_by_hand(THREE, trials=3)
-    assert bytes(table) == (tmp_path / "hand").read_bytes()
-    assert sorted([*table.textures, *left_out]) == sorted(tactus.simulate(THREE, trials=1))
-
-
 def test_a_simulated_rig_explores(command):
     known = tactus.simulate([*THREE, "47", "marble"], trials=3)
     table = tactus.Table.learn_slides({name: [s.features() for s in slides] for name, slides in known.items()})
