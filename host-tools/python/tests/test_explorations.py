@@ -93,11 +93,7 @@ def test_a_verification_is_the_commands(biotac, command, tmp_path):
 def test_simulated_slides_are_the_commands(command, tmp_path):
     command("simulate", "--out", tmp_path / "world", "--textures", ",".join(THREE), "--trials", 2, "--seed", 4)
     theirs = tactus.Recordings(tmp_path / "world")
-    ours = tactus.simulate(THREE, trials=2, seed=4, folder=tmp_path / "mine")
-    files = {path.name: path.read_bytes() for path in (tmp_path / "world").iterdir()}
-    assert {path.name: path.read_bytes() for path in (tmp_path / "mine").iterdir()} == files
-    with pytest.raises(tactus.RecordingError):
-        tactus.simulate(THREE, trials=2, seed=5, folder=tmp_path / "mine")
+    ours = tactus.simulate(THREE, trials=2, seed=4)
     assert list(ours) == theirs.textures and len(theirs) == len(ours) * 3 * 2
     for name, slides in ours.items():
         for our, their in zip(slides, theirs.slides(name)):

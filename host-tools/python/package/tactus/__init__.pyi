@@ -233,7 +233,6 @@ def simulate(
     trials: int = 5,
     seed: int = 1,
     finger: str = "biotac",
-    folder: Union[str, PathLike[str], None] = None,
 ) -> Dict[str, List[Slide]]: ...
 
 class Events(Iterator[Dict[str, Any]]):
