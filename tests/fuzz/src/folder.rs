@@ -136,8 +136,12 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
 "sha256_gz":"PACKED_HASH","sha256_raw":"HASH"}]}"#;
     let properties = "texture,movement,trial,set,traction,roughness,fineness\n1,1,1,train,0.5,3.2,5.1\n\
         1,1,2,train,0.6,3.1,5.2\n2,1,1,train,0.9,2.2,4.1\n2,1,2,train,0.8,2.4,4.0\n1,1,1,validate,0.5,3.2,5.1\n";
-    let movements = [120, 150, 180].map(|setpoint| [10, 20, 50, 100, 120].map(|mm_s| (setpoint, mm_s)));
-    let twice = movements.as_flattened().iter().flat_map(|movement| [(0, movement), (1, movement)]);
+    let movements =
+        [120, 150, 180].map(|setpoint| [10, 20, 50, 100, 120].map(|mm_s| (setpoint, mm_s)));
+    let twice = movements
+        .as_flattened()
+        .iter()
+        .flat_map(|movement| [(0, movement), (1, movement)]);
     let recordings = twice.zip(0..).map(|((rep, (setpoint, mm_s)), number)| {
         format!(
             r#"{{"pressure_setpoint":{setpoint},"speed_mm_s":{mm_s},"direction":-1,"rep":{rep},"n":72,"offset_values":{}}}"#,
