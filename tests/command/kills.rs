@@ -135,16 +135,6 @@ fn an_import_that_is_killed_goes_on() {
     assert!(import.kill(30, 0.9) > 5);
 }
 
-#[test]
-#[ignore = "takes minutes: the smallest study has 117 textures"]
-fn a_study_that_is_killed_goes_on() {
-    let study = Writes {
-        arguments: &["study", "all", "--simulations", "16", "--out"],
-        is_whole: |folder| folder.join("report.html").exists(),
-    };
-    assert!(study.kill(6, 0.9) > 2);
-}
-
 /// A shell's limit of a file's size stands for a full disk: writing fails in the middle of a file.
 #[cfg(unix)]
 #[test]

@@ -39,8 +39,7 @@ is taken for new.
 does, and counts the errors: at the limits, and where both are equal.
 These need the method fused.
 
---plot draws what is told of each texture (confusion), how often it was right when it said 99 %
-(reliability). With --verify it draws one error against the other (trade-off).
+--plot draws what is told of each texture (confusion), or with --verify one error against the other (trade-off).
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift

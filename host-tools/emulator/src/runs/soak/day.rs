@@ -258,7 +258,7 @@ fn run_episode(
     if probe.rig.servo.rig().control().skin().is_worn() {
         recover(day, probe)?;
         let rig = probe.rig.servo.rig();
-        if rig.world().replace_skin().is_ok() {
+        if rig.world().put_on_skin(0.0).is_ok() {
             rig.control().skin().replaced();
             day.skins += 1;
         }
