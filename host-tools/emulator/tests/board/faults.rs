@@ -584,7 +584,6 @@ fn a_fault_of_each_kind_is_answered_in_time() {
         "emergency stop while pressing",
         "the lever runs down while pressing",
         "the servo hangs",
-        "the servo crashes",
     ]);
 }
 
