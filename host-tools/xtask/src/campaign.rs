@@ -22,10 +22,8 @@ Examples:
   cargo xtask campaign rig --finger mems            seeds 1 to 20 on the emulated board, with another finger
   cargo xtask campaign identify --seeds 200-330     every method
   cargo xtask campaign study --seeds 1-10 -- --simulations 8000
-  cargo xtask campaign faults --seeds 1-2000        goes on where it was interrupted
-  cargo xtask campaign faults --seeds 17 -- --again one of them once more
-  cargo xtask campaign boards -- --simulated 4 --recordings 0
-  cargo xtask campaign soak -- --pc-hours 1 --board-hours 0
+  cargo xtask campaign rig --seeds 1-20 -- --recording 3   slides of a real BioTac under the finger
+  cargo xtask campaign faults --seeds 1-2000
   cargo xtask campaign factory -- --write           makes the tables that come with the firmware, shared/tables/*.tact
   cargo xtask campaign fuzz -- table --seconds 60   one target
   cargo xtask campaign mutants -- --in-diff my.diff only what a diff touches";
@@ -72,16 +70,12 @@ enum Part {
     Rig,
     /// Explorations by the handheld on the emulated board, in a hand that differs from seed to seed
     Handheld,
-    /// Explorations on emulated boards, simulated and recorded, which the PC follows to the bit
-    Boards,
     /// Power cuts at every word that the firmware stores
     Cuts,
     /// The PC's simulated rig, which breaks at any moment of whatever its probe does
     Faults,
     /// The same on emulated boards, with the firmware
     BoardFaults,
-    /// A day on the simulated rig and an hour on the emulated board, with random faults
-    Soak,
     /// `tactus study all`, with few simulations
     Study,
     /// `tactus identify --simulated`, by every method
@@ -209,13 +203,7 @@ fn perform(part: Part, options: &Options) -> Result<String> {
         (Part::Page, _) => page::emulated().map(|()| "passed".into()),
         (Part::Package, _) => package(),
         (Part::Tests, _) => left_out(),
-        (Part::Boards, _) => on_boards("campaign", &["--cuts", "0"], options),
-        (Part::Cuts, _) => on_boards(
-            "campaign",
-            &["--simulated", "0", "--recordings", "0"],
-            options,
-        ),
-        (Part::Soak, _) => on_boards("soak", &[], options),
+        (Part::Cuts, _) => result(&mut emulate::command("cuts", &options.options)?),
         (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
         (Part::Planted, _) => fuzz::fuzz(&["--planted", "--seconds", "150"].map(OsString::from)),
@@ -243,37 +231,27 @@ fn sentence(lines: &[String]) -> String {
     all.join(" ")
 }
 
-/// Runs the emulator with the rig's firmware.
-fn on_boards(run: &str, usual: &[&str], options: &Options) -> Result<String> {
-    let usual = usual.iter().map(OsString::from);
-    // what is given comes last, and counts
-    let all: Vec<OsString> = usual.chain(options.options.iter().cloned()).collect();
-    result(&mut emulate::command(run, &all)?)
-}
-
 fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
-    let file = target()
-        .join("campaign")
-        .join(part.name())
-        .with_extension("jsonl");
     let count = seeds.end() - seeds.start() + 1;
-    let mut all: Vec<OsString> = vec!["--faults".into(), count.to_string().into()];
-    all.extend([
-        "--seed".into(),
-        seeds.start().to_string().into(),
-        "--out".into(),
-        file.into(),
-    ]);
+    let numbers = [("--faults", count), ("--seed", *seeds.start())];
+    let numbers = numbers.map(|(name, number)| [name.into(), number.to_string().into()]);
+    let all: Vec<OsString> = numbers
+        .into_iter()
+        .flatten()
+        .chain(options.options.iter().cloned())
+        .collect();
+    let mut cases = if part == Part::BoardFaults {
+        emulate::command("faults", &all)?
+    } else {
+        run(&mut emulate::build())?;
+        let mut cases = emulate::program("faults");
+        cases.args(all);
+        cases
+    };
     if let Some(jobs) = options.jobs {
-        all.extend(["--jobs".into(), jobs.to_string().into()]);
+        cases.env("RAYON_NUM_THREADS", jobs.to_string());
     }
-    all.extend(options.options.iter().cloned());
-    if part == Part::BoardFaults {
-        all.push("--board".into());
-        return result(&mut emulate::command("faults", &all)?);
-    }
-    run(&mut emulate::build())?;
-    result(emulate::program("faults").args(all))
+    result(&mut cases)
 }
 
 /// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own.

@@ -16,8 +16,8 @@ use crate::board::{Emulator, Error, Options};
 /// Trials of each texture and movement (PAPER: five).
 pub const TRIALS: u32 = 5;
 /// Limits of recordings.
-pub const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not hold \
-     is clipped; learned and explored slides are of one session (interleaved).";
+pub(crate) const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not \
+     hold is clipped; learned and explored slides are of one session (interleaved).";
 
 /// Reasons why there is nothing to learn, or no texture under the finger.
 #[derive(Debug, thiserror::Error)]
@@ -41,14 +41,6 @@ pub enum KnownError {
         "no texture {0} in Table 1: `tactus textures` lists them, or give a number from 1 to 117"
     )]
     NoTexture(String),
-    /// The table that should be given to the firmware cannot be read.
-    #[error("cannot read the table {}: {source}", path.display())]
-    Table {
-        /// Its path.
-        path: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
     /// There is no such texture in the recordings.
     #[error("no material {name}; there are {known}, or give a number from 1")]
     NoMaterial {
