@@ -125,9 +125,6 @@ fn session(folder: &Path, name: &str) -> PathBuf {
 #[test]
 fn pictures_can_be_read_and_change_nothing_else() {
     let temp = tempfile::tempdir().unwrap();
-    let log = session(temp.path(), "identify");
-    let paper_log = session(temp.path(), "paper");
-    let (log, paper_log) = (log.to_str().unwrap(), paper_log.to_str().unwrap());
     let recorded = |more: &[&'static str]| [&more[..1], &RECORDINGS, &more[1..]].concat();
     let all = |figures: &[&'static str]| figures.to_vec();
     let exploration = || all(&["posterior", "spectrum"]);
@@ -161,26 +158,12 @@ fn pictures_can_be_read_and_change_nothing_else() {
             vec!["identify", "--simulated", "--among", "4", "--seed", "3"],
             exploration(),
         ),
-        (vec!["device", "log", "show", log], exploration()),
-        (vec!["device", "log", "replay", paper_log], exploration()),
+        (vec!["table", "shared/tables/factory.tact"], all(&["map"])),
         (
-            vec!["table", "show", "shared/tables/factory.tact"],
+            vec!["table", "shared/tables/handheld.tact", "--format", "json"],
             all(&["map"]),
         ),
-        (
-            vec![
-                "table",
-                "show",
-                "shared/tables/handheld.tact",
-                "--format",
-                "json",
-            ],
-            all(&["map"]),
-        ),
-        (
-            vec!["table", "show", "tests/golden/paper.tact"],
-            all(&["map"]),
-        ),
+        (vec!["table", "tests/golden/paper.tact"], all(&["map"])),
     ];
     for (number, (command, figures)) in commands.iter().enumerate() {
         let folder = temp.path().join(format!("pictures/{number}"));
@@ -386,7 +369,7 @@ fn the_posterior_is_that_of_the_json() {
     assert!(compared >= slides.len(), "{drawn:#?}");
 }
 
-/// Distances of a table of Gaussians, computed again from the JSON of `table show`.
+/// Distances of a table of Gaussians, computed again from the JSON of `table`.
 #[test]
 fn the_map_names_the_nearest_texture() {
     let temp = tempfile::tempdir().unwrap();
