@@ -3,8 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
@@ -108,18 +107,6 @@ fn look(name: &str, svg: &str) {
         let is_outer = drawing.children().any(|n| is(&n, "svg"));
         assert!(style || is_outer, "{name} has no dark colours");
     }
-}
-
-/// The log of a session, unpacked.
-fn session(folder: &Path, name: &str) -> PathBuf {
-    let packed = fs::File::open(root().join(format!("tests/golden/{name}.jsonl.gz"))).unwrap();
-    let mut log = Vec::new();
-    flate2::read::GzDecoder::new(packed)
-        .read_to_end(&mut log)
-        .unwrap();
-    let file = folder.join(format!("{name}.jsonl"));
-    fs::write(&file, log).unwrap();
-    file
 }
 
 #[test]
