@@ -52,7 +52,7 @@ const DAMAGES: [Damage; 12] = [
     ),
 ];
 const PROPERTIES: &str = "evaluate --properties DIR/properties.csv --method paper --runs 20";
-const TABLE: &str = "table show DIR/t.tact";
+const TABLE: &str = "table DIR/t.tact";
 const LOG: &str = "device log replay DIR/session.jsonl";
 
 /// What is said of a file that is not there.

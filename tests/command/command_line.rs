@@ -124,33 +124,6 @@ fn the_command_is_tactus_whatever_its_package() {
 }
 
 #[test]
-fn verbose_tells_files_and_choices_beside_the_same_results() {
-    let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
-    let plain = [
-        "identify",
-        "--recordings",
-        recordings,
-        "--material",
-        "1",
-        "--train-slides",
-        "2",
-    ];
-    let verbose = [&plain[..], &["--verbose"]].concat();
-    let [quiet, told] = [&plain[..], &verbose].map(tactus);
-    assert_eq!(quiet.stdout, told.stdout);
-    assert!(!String::from_utf8_lossy(&quiet.stderr).contains("INFO"));
-    let told = String::from_utf8_lossy(&told.stderr);
-    for words in [
-        "reads the manifest folder=",
-        "slides=",
-        "reads samples texture=",
-        "chooses movement=",
-    ] {
-        assert!(told.contains(words), "{words}: {told}");
-    }
-}
-
-#[test]
 fn a_table_goes_through_pipes() {
     let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
     let temp = tempfile::tempdir().unwrap();
@@ -173,7 +146,7 @@ fn a_table_goes_through_pipes() {
     let beside = String::from_utf8_lossy(&piped.stderr).replacen('-', path(&table), 1);
     assert_eq!(beside, String::from_utf8_lossy(&said));
     let check = Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .args(["table", "check", "-"])
+        .args(["table", "-"])
         .stdin(fs::File::open(&table).unwrap())
         .output()
         .unwrap();
@@ -264,7 +237,7 @@ fn simulated_recordings_are_learned_and_evaluated_like_real_ones() {
         "--out",
         path(&table),
     ]);
-    assert!(printed(&["table", "show", path(&table)]).contains("movement 3: 0.20 N, 63.1 mm/s"));
+    assert!(printed(&["table", path(&table)]).contains("movement 3: 0.20 N, 63.1 mm/s"));
     let explored = printed(&[
         "identify",
         "--recordings",
@@ -401,8 +374,7 @@ fn a_table_is_learned_shown_checked_and_used() {
         "--out",
         path(&file),
     ]);
-    assert!(printed(&["table", "check", path(&file)]).contains("good; 20 textures, 1 movement,"));
-    let shown = printed(&["table", "show", path(&file)]);
+    let shown = printed(&["table", path(&file)]);
     assert!(
         shown.contains("0.80 N, 25.0 mm/s")
             && shown.contains("bath towel")
@@ -473,8 +445,7 @@ fn a_bad_table_is_refused_with_the_check_that_failed() {
     ] {
         fs::write(&file, bytes).unwrap();
         for command in [
-            &["table", "check", path(&file)][..],
-            &["table", "show", path(&file)],
+            &["table", path(&file)][..],
             &[
                 "identify",
                 "--recordings",
@@ -489,7 +460,7 @@ fn a_bad_table_is_refused_with_the_check_that_failed() {
             assert!(said.contains(check) && said.contains(path(&file)), "{said}");
         }
     }
-    assert!(complaint(&["table", "check", "no/such/table"]).contains("no/such/table"));
+    assert!(complaint(&["table", "no/such/table"]).contains("no/such/table"));
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn tactus(arguments: &[&str]) -> Output {
 }
 
 fn convert(from: &Path, kind: &str, to: &Path) {
-    let out = tactus(&["convert", text(from), kind, text(to), "--format", "json"]);
+    let out = tactus(&["convert", text(from), kind, text(to)]);
     assert!(out.status.success(), "{out:?}");
     let written: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(written[0]["bytes"], fs::metadata(to).unwrap().len());

@@ -4,7 +4,6 @@ mod bad_input;
 mod command_line;
 mod convert;
 mod device;
-mod examples;
 mod kills;
 mod output;
 mod study;

@@ -1,6 +1,5 @@
 //! What commands print for programs, how they end, and what they make of names, folders and ports.
 
-use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -108,31 +107,16 @@ fn an_exploration_is_one_object() {
 fn tables_and_features_are_objects() {
     let temp = tempfile::tempdir().unwrap();
     let file = temp.path().join("table");
-    let learn = [
-        "learn",
-        "--recordings",
-        SIMULATED,
-        "--out",
-        path(&file),
-        "--format",
-        "json",
-    ];
+    let learn = ["learn", "--recordings", SIMULATED, "--out", path(&file)];
     // five slides are asked for by default, and there are three
-    let learned = json(&learn, 0);
-    assert_eq!(learned["textures"], 6);
-    assert_eq!(learned["short"].as_array().unwrap().len(), 18);
-    assert_eq!(learned["short"][0]["slides"], 3);
-    let shown = json(&["table", "show", path(&file), "--format", "json"], 0);
-    assert_eq!(shown["checksum"], learned["checksum"]);
+    let learned = String::from_utf8(tactus(&learn).stdout).unwrap();
+    assert_eq!(learned.matches("only 3 slides").count(), 18, "{learned}");
+    let shown = json(&["table", path(&file), "--format", "json"], 0);
+    assert_eq!(shown["textures"].as_array().unwrap().len(), 6);
     assert_eq!(shown["movements"].as_array().unwrap().len(), 3);
     let texture = &shown["textures"][0];
     assert_eq!(texture["movements"][0]["trials"], 3);
     assert!(texture["movements"][0]["nearest_sd"].as_f64().unwrap() > 0.0);
-    let checked = json(&["table", "check", path(&file), "--format", "json"], 0);
-    assert_eq!(checked["checksum"], learned["checksum"]);
-    let known = json(&["textures", "--table", path(&file), "--format", "json"], 0);
-    assert_eq!(known.as_array().unwrap().len(), 6);
-
     let features = tactus(&["features", "--recordings", SIMULATED, "--format", "json"]);
     let lines = String::from_utf8(features.stdout).unwrap();
     let lines: Vec<serde_json::Value> = lines
@@ -170,11 +154,6 @@ fn names_are_found_whatever_their_case_and_slips_are_named() {
     assert!(said(&identify("cordoroy"), 1).contains("did you mean Corduroy?"));
     let simulated = ["identify", "--simulated", "--texture", "burlpa"];
     assert!(said(&simulated, 1).contains("did you mean Burlap?"));
-    let textures = String::from_utf8(tactus(&["textures"]).stdout).unwrap();
-    assert_eq!(textures.lines().count(), 117);
-    assert!(textures.contains("  1 Computer paper"));
-    let recorded = tactus(&["textures", "--recordings", SIMULATED]).stdout;
-    assert_eq!(String::from_utf8(recorded).unwrap().lines().count(), 6);
 }
 
 #[test]
@@ -227,10 +206,7 @@ fn tables_and_logs_are_read_from_standard_input() {
         "/../../shared/tables/factory.tact"
     ));
     let show = |file: &str, stdin: Stdio| {
-        let out = command(&["table", "show", file])
-            .stdin(stdin)
-            .output()
-            .unwrap();
+        let out = command(&["table", file]).stdin(stdin).output().unwrap();
         assert!(out.status.success(), "{out:?}");
         out.stdout
     };
@@ -511,11 +487,9 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
             "--train-slides",
             "2",
         ];
-        json(
-            &[&learn[..], &["--out", path(&table), "--format", "json"]].concat(),
-            0,
-        );
-        let shown = json(&["table", "show", path(&table), "--format", "json"], 0);
+        let out = tactus(&[&learn[..], &["--out", path(&table)]].concat());
+        assert!(out.status.success(), "{out:?}");
+        let shown = json(&["table", path(&table), "--format", "json"], 0);
         let of = |t: &serde_json::Value| {
             let name = t["name"].as_str().unwrap().to_owned();
             (name, t["sample_moved"].as_bool())
@@ -575,34 +549,6 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
     crc.update(&damaged[..body]);
     damaged[body..].copy_from_slice(&crc.sum().to_le_bytes());
     std::fs::write(&table, damaged).unwrap();
-    let refused = said(&["table", "check", path(&table)], 1);
+    let refused = said(&["table", path(&table)], 1);
     assert!(refused.contains("section 3 is damaged"), "{refused}");
-}
-
-#[test]
-fn a_log_is_shown_as_objects() {
-    let temp = tempfile::tempdir().unwrap();
-    let log = temp.path().join("session.jsonl");
-    let packed = "../../tests/golden/identify.jsonl.gz";
-    let packed = fs::File::open(Path::new(env!("CARGO_MANIFEST_DIR")).join(packed)).unwrap();
-    let mut unpacked = fs::File::create(&log).unwrap();
-    std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut unpacked).unwrap();
-    let all = json(
-        &["device", "log", "show", path(&log), "--format", "json"],
-        0,
-    );
-    let [exploration] = all.as_array().unwrap().as_slice() else {
-        panic!("{all}");
-    };
-    assert_eq!(
-        (&exploration["among"], &exploration["seed"]),
-        (&3.into(), &5.into())
-    );
-    assert_eq!(exploration["verdict"]["told"], "sure");
-    assert_eq!(exploration["verdict"]["texture"], "Polyurethane rubber");
-    let slide = &exploration["slides"][0];
-    assert!(
-        (slide["traction_n"].as_f64().unwrap() - 1.565_463).abs() < 1e-5,
-        "{slide}"
-    );
 }

@@ -3,8 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
@@ -110,23 +109,9 @@ fn look(name: &str, svg: &str) {
     }
 }
 
-/// The log of a session, unpacked.
-fn session(folder: &Path, name: &str) -> PathBuf {
-    let packed = fs::File::open(root().join(format!("tests/golden/{name}.jsonl.gz"))).unwrap();
-    let mut log = Vec::new();
-    flate2::read::GzDecoder::new(packed)
-        .read_to_end(&mut log)
-        .unwrap();
-    let file = folder.join(format!("{name}.jsonl"));
-    fs::write(&file, log).unwrap();
-    file
-}
-
 #[test]
 fn pictures_can_be_read_and_change_nothing_else() {
     let temp = tempfile::tempdir().unwrap();
-    let log = session(temp.path(), "identify");
-    let paper_log = session(temp.path(), "paper");
     let evaluate = "--runs 300 --method paper --threshold 0.97";
     let commands = [
         (recorded("evaluate", evaluate), "confusion"),
@@ -139,17 +124,12 @@ fn pictures_can_be_read_and_change_nothing_else() {
             "identify --simulated --among 4 --seed 3".to_owned(),
             "posterior",
         ),
-        (format!("device log show {}", log.display()), "posterior"),
+        ("table shared/tables/factory.tact".to_owned(), "map"),
         (
-            format!("device log replay {}", paper_log.display()),
-            "posterior",
-        ),
-        ("table show shared/tables/factory.tact".to_owned(), "map"),
-        (
-            "table show shared/tables/handheld.tact --format json".to_owned(),
+            "table shared/tables/handheld.tact --format json".to_owned(),
             "map",
         ),
-        ("table show tests/golden/paper.tact".to_owned(), "map"),
+        ("table tests/golden/paper.tact".to_owned(), "map"),
     ];
     for (number, (command, figure)) in commands.iter().enumerate() {
         let folder = temp.path().join(format!("pictures/{number}"));
@@ -326,7 +306,7 @@ fn the_posterior_is_that_of_the_json() {
     assert!(compared >= slides.len(), "{drawn:#?}");
 }
 
-/// Distances of a table of Gaussians, computed again from the JSON of `table show`.
+/// Distances of a table of Gaussians, computed again from the JSON of `table`.
 #[test]
 fn the_map_names_the_nearest_texture() {
     let temp = tempfile::tempdir().unwrap();

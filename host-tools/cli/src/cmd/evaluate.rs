@@ -17,7 +17,6 @@ mod experiment;
 mod novelty;
 mod verify;
 
-/// Plays the explorations that the arguments ask for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
