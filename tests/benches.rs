@@ -8,13 +8,11 @@ use divan::Bencher;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::Movement;
-use tactus_core::features::Observation;
-use tactus_core::features::{Block, Measurement, Properties, Property, PropertySet, Slide};
+use tactus_core::features::{Block, Observation, Properties, Property, PropertySet, Slide};
 use tactus_core::table::{Action, Experience, Table};
 use tactus_lab::data::properties::PropertyTable;
-use tactus_lab::data::replay::MeasuredSlide;
-use tactus_lab::eval::evaluate::{Method, evaluate};
-use tactus_lab::eval::experiment::{Experiment, Protocol};
+use tactus_lab::eval::evaluate::evaluate;
+use tactus_lab::eval::experiment::Experiment;
 use tactus_lab::eval::learn::encode;
 use tactus_lab::sim::rig::SimRig;
 use tactus_tests::{data, numpy, skipped};
@@ -167,46 +165,6 @@ fn first_choice(bencher: Bencher<'_, '_>) {
     bencher.bench(|| {
         Explorer::<128>::new(table, PropertySet::ALL, Config::default()).map(|e| e.slides())
     });
-}
-
-/// 8000 runs of `tactus evaluate`: 20 textures of 34 slides, one movement, as in data/biotac.
-#[divan::bench(sample_count = 10)]
-fn evaluate_8000_runs(bencher: Bencher<'_, '_>) {
-    let mut noise = noise(3);
-    let plan = Plan::new();
-    let samples = samples(600);
-    let measurement: Measurement = {
-        let mut slide = Slide::new(&plan, Movement::FOR_FINENESS);
-        slide.set_background(2.0);
-        for block in Block::cut(&[], 0..600, &samples, &[]) {
-            slide.take(&block);
-        }
-        slide.finish().unwrap()
-    };
-    let names: Vec<String> = (0..20).map(|t| format!("texture {t}")).collect();
-    let observed: Vec<Vec<MeasuredSlide>> = names
-        .iter()
-        .map(|_| {
-            let centre = [2.5 + noise(), 9.0 + 1.5 * noise(), 2.5 + 0.5 * noise()];
-            (1..=34)
-                .map(|number| MeasuredSlide {
-                    number,
-                    movement: Movement::FOR_FINENESS,
-                    measurement: Measurement {
-                        properties: Properties::new(centre.map(|c| Some(c + 0.2 * noise()))),
-                        ..measurement.clone()
-                    },
-                })
-                .collect()
-        })
-        .collect();
-    let experiment =
-        Experiment::recorded(names, &observed, None, Protocol::Interleaved, 5, 1).unwrap();
-    let config = Config {
-        strategy: Method::Paper.strategy(),
-        ..Config::default()
-    };
-    bencher.bench(|| evaluate(&experiment, config, 8000, || ()).unwrap().len());
 }
 
 /// A second of the simulated rig at rest: world, sensor words and control.

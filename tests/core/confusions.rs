@@ -7,7 +7,7 @@ use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::measure_all;
 use tactus_lab::eval::evaluate::{Method, Shared, explorer};
 use tactus_lab::eval::experiment::{Experiment, Protocol};
-use tactus_tests::data;
+use tactus_tests::{count, data};
 
 /// Explores, and compares the expected outcome of every action at every step; the number of outcomes compared.
 fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>) -> usize {
@@ -25,7 +25,7 @@ fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>)
     let mut explorer = shared.explorer;
     let bits = |o: &ExpectedOutcome| (o.action, o.uncertainty.to_bits(), o.benefit.to_bits());
     let mut outcomes = 0;
-    for number in 0..150 {
+    for number in 0..runs() {
         let mut run = experiment.run(number);
         explorer.restart();
         while explorer.verdict().is_none() {
@@ -44,6 +44,10 @@ fn compared(experiment: &Experiment, method: Method, candidates: Option<&[u16]>)
     outcomes
 }
 
+fn runs() -> u64 {
+    count(150, 50)
+}
+
 const METHODS: [(Method, usize); 4] = [
     (Method::Paper, 9),
     (Method::Student, 9),
@@ -54,14 +58,18 @@ const METHODS: [(Method, usize); 4] = [
 #[test]
 fn stored_degrees_give_the_same_outcomes_in_the_worlds() {
     let Some(folder) = data("worlds") else { return };
-    for world in 1..=3 {
+    for world in 1..=count(3, 1) {
         let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
         let experiment = Experiment::given(&set, None, 1).unwrap();
         let few: Vec<u16> = (0..117).step_by(3).collect();
         for (method, actions) in METHODS {
             for candidates in [None, Some(few.as_slice())] {
                 let outcomes = compared(&experiment, method, candidates);
-                assert_eq!(outcomes, 150 * 10 * actions, "world {world}, {method:?}");
+                assert_eq!(
+                    outcomes,
+                    runs() as usize * 10 * actions,
+                    "world {world}, {method:?}"
+                );
             }
         }
     }
@@ -76,6 +84,6 @@ fn stored_degrees_give_the_same_outcomes_on_recordings() {
     let experiment = Experiment::recorded(names, &observed, None, Protocol::Drift, 5, 1).unwrap();
     for (method, actions) in METHODS {
         let outcomes = compared(&experiment, method, None);
-        assert_eq!(outcomes, 150 * 10 * actions / 3, "{method:?}");
+        assert_eq!(outcomes, runs() as usize * 10 * actions / 3, "{method:?}");
     }
 }

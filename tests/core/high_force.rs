@@ -1,7 +1,6 @@
 //! Movements of up to 2 N, for a rig whose finger's mount yields: asked of the probe, judged by the world's force on the finger.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
@@ -15,8 +14,11 @@ use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_lab::sim::press::{Bench, FORCE_LIMIT_N, Press, Trouble};
 use tactus_lab::sim::probe::{Host, SimProbe, switch_off_and_on, switch_on};
 use tactus_lab::sim::rig::SimRig;
+use tactus_tests::seeds;
 use tactus_world::mount::Mount;
 use tactus_world::world::Setup;
+
+use crate::rigs::texture;
 
 /// The strongest row of the paper's grid.
 fn two_newtons() -> Movement {
@@ -127,7 +129,7 @@ fn a_probe_presses_two_newtons_only_where_that_is_set() {
 fn two_newtons_are_made_and_no_trouble_presses_harder_than_2_2() {
     let movements = [(1585, 25_119), (1995, 15_849), (2000, 63_096)];
     let movements = movements.map(|(mn, um_s)| Movement::new(mn, um_s).unwrap());
-    let benches = (1..=50u64).flat_map(|seed| {
+    let benches = seeds(50).flat_map(|seed| {
         let mounts = [Mount::FOR_2_N, Mount::STIFF];
         let each = |mount| Trouble::ALL.map(|trouble| (mount, trouble));
         mounts
@@ -135,7 +137,7 @@ fn two_newtons_are_made_and_no_trouble_presses_harder_than_2_2() {
             .flat_map(each)
             .map(move |(mount, trouble)| Bench {
                 world: seed,
-                texture: 1 + (seed * 37 % 117) as u8,
+                texture: texture(seed),
                 trouble,
                 unguarded: Unguarded::default(),
                 mount,
@@ -149,16 +151,6 @@ fn two_newtons_are_made_and_no_trouble_presses_harder_than_2_2() {
             bench.make([movement])
         })
         .collect();
-    let mut ends = BTreeMap::new();
-    for press in &presses {
-        let Press { bench, ended, .. } = press;
-        let sprung = bench.mount == Mount::FOR_2_N;
-        let key = format!("{:?} sprung {sprung} {ended:?}", bench.trouble);
-        let (count, most_n) = ends.entry(key).or_insert((0, 0.0_f64));
-        *count += 1;
-        *most_n = most_n.max(press.force_max_n);
-    }
-    println!("{ends:#?}");
     let list = |chosen: &dyn Fn(&&Press) -> bool| {
         let lines = presses.iter().filter(chosen).map(ToString::to_string);
         lines.collect::<Vec<_>>()

@@ -20,6 +20,7 @@ mod played;
 mod presses;
 mod recordings;
 mod refresh;
+mod rigs;
 mod same;
 mod simulated_rig;
 mod training;

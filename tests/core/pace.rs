@@ -8,6 +8,7 @@ use tactus_core::table::Table;
 use tactus_lab::eval::learn;
 use tactus_lab::sim::collection::Collection;
 use tactus_lab::sim::handheld::slides;
+use tactus_tests::count;
 use tactus_world::person::Manner;
 
 /// Slides of each texture that a table is learned from, as the factory's.
@@ -108,7 +109,7 @@ fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
 fn a_sensor_of_speed_tells_more_and_its_loss_costs_nothing() {
     let textures: Vec<u8> = (1..=117).step_by(3).collect();
     let mut sums = [Counts::default(); 3];
-    for seed in 1..=2 {
+    for seed in 1..=count(2, 1) {
         let counts = world(seed, &textures, hand(0.25, 0.20));
         sums.iter_mut().zip(counts).for_each(|(sum, c)| sum.add(c));
     }

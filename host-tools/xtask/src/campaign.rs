@@ -66,7 +66,7 @@ enum Part {
     Page,
     /// The package for the registry, packed, and compiled as others will
     Package,
-    /// Tests that `cargo xtask test` leaves out, in the workspace and on emulated boards
+    /// Tests that `cargo xtask test` leaves out, and all seeds of the others, in the workspace and on emulated boards
     Tests,
     /// Explorations on the emulated board
     Rig,
@@ -276,15 +276,20 @@ fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<
     result(emulate::program("faults").args(all))
 }
 
-/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own.
+/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own; in the workspace also all others,
+/// with all of their seeds.
 fn left_out() -> Result<String> {
-    let ignored = ["--", "--ignored", "--skip", "the_whole_campaign"];
+    let skip = ["--skip", "the_whole_campaign"];
     let mut board_tests = emulate::tests();
     let board_tests = emulate::with_images(&mut board_tests, &firmware::elves()?)?;
+    board_tests.args(["--", "--ignored"]);
     let (mut passed, mut workspace) = (0, cargo());
     workspace.args(["test", "--release", "--workspace", "--no-fail-fast"]);
+    workspace
+        .args(["--", "--include-ignored"])
+        .env("TACTUS_ALL_SEEDS", "1");
     for tests in [&mut workspace, board_tests] {
-        hear(tests.args(ignored), |line| {
+        hear(tests.args(skip), |line| {
             let result = line.strip_prefix("test result: ok. ");
             let count = result.and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
             passed += count.unwrap_or_default();
