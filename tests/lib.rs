@@ -45,8 +45,8 @@ pub fn skipped(why: &str) {
     }
 }
 
-/// All of a test's draws in the campaign (`TACTUS_ALL_SEEDS=1`, as `cargo xtask campaign tests` sets it), a few in the test
-/// command.
+/// All of a test's draws in the campaign (`TACTUS_ALL_SEEDS=1`, as `cargo xtask campaign tests` sets it), a few in the
+/// test command.
 pub fn count(all: u64, few: u64) -> u64 {
     match std::env::var("TACTUS_ALL_SEEDS").as_deref() {
         Ok("1") => all,
@@ -59,8 +59,9 @@ pub fn seeds(all: u64) -> std::ops::RangeInclusive<u64> {
     1..=count(all, 5)
 }
 
-/// A table of properties for `tactus evaluate --properties`. Each set, "train" and "validate", has `trials` of a texture, a
-/// movement and a set. Textures lie 1 apart in each property, their trials up to a hundredth of their squares.
+/// A table of properties for `tactus evaluate --properties`. Each set, "train" and "validate", has `trials` of a
+/// texture, a movement and a set. Textures lie 1 apart in each property, their trials up to a hundredth of their
+/// squares.
 pub fn properties_csv(
     textures: i32,
     movements: i32,

@@ -273,7 +273,8 @@ fn a_force_scale_that_nobody_measured_has_no_date() {
     );
 }
 
-/// "The same as this one?" of what lies under the finger, the share of false alarms that the probe keeps, and a new skin.
+/// "The same as this one?" of what lies under the finger, the share of false alarms that the probe keeps, and a new
+/// skin.
 #[test]
 fn a_probe_verifies_keeps_its_settings_and_is_refreshed() {
     let bench = Bench::new(1000);

@@ -1,5 +1,5 @@
-//! Commands that write folders are killed at random moments, or run out of space: what they leave never looks whole, and the
-//! same command goes on and ends with the bytes of one that nobody disturbed.
+//! Commands that write folders are killed at random moments, or run out of space: what they leave never looks whole,
+//! and the same command goes on and ends with the bytes of one that nobody disturbed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -58,8 +58,8 @@ impl Writes<'_> {
         (files(&place.join("out")), begun.elapsed())
     }
 
-    /// Runs it and kills it after a while, again and again, until it comes to its end or so many were killed; then the next
-    /// folder. How many left something to go on with.
+    /// Runs it and kills it after a while, again and again, until it comes to its end or so many were killed; then the
+    /// next folder. How many left something to go on with.
     fn kill(&self, kills: u32, share: f64) -> u32 {
         let home = tempfile::tempdir().unwrap();
         let (whole, took) = self.run(&home.path().join("undisturbed"));
@@ -127,16 +127,6 @@ fn an_import_that_is_killed_goes_on() {
     };
     let kills = count(30, 10) as u32;
     assert!(import.kill(kills, 0.9) > kills / 6);
-}
-
-#[test]
-#[ignore = "takes minutes: the smallest study has 117 textures"]
-fn a_study_that_is_killed_goes_on() {
-    let study = Writes {
-        arguments: &["study", "all", "--simulations", "16", "--out"],
-        is_whole: |folder| folder.join("report.html").exists(),
-    };
-    assert!(study.kill(6, 0.9) > 2);
 }
 
 /// A shell's limit of a file's size stands for a full disk: writing fails in the middle of a file.

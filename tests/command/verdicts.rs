@@ -83,7 +83,8 @@ fn identifications_in_the_simulated_world_agree_with_evaluate() {
     compare(&at, 3, "paper", "--max-slides 1", count(25, 6));
 }
 
-/// Worlds with a texture under the simulated finger against itself, and against another that the probe knows or does not.
+/// Worlds with a texture under the simulated finger against itself, and against another that the probe knows or does
+/// not.
 #[test]
 fn live_slides_are_verified_as_often_right_as_it_says() {
     let at = Scratch::new();

@@ -1,5 +1,5 @@
-//! A rig that somebody else's arm moves: explorations are right, and whatever the arm does, the world's force on the finger stays below
-//! what hurts it, and no slide counts that was not made as it was asked for.
+//! A rig that somebody else's arm moves: explorations are right, and whatever the arm does, the world's force on the
+//! finger stays below what hurts it, and no slide counts that was not made as it was asked for.
 
 use std::cell::RefCell;
 use std::sync::OnceLock;
@@ -193,8 +193,8 @@ fn an_arm_that_presses_too_hard_is_stopped() {
         let how = Misbehaves::ComesDown { mm_s, stops_ms };
         ends_in(how, &[Fault::ForceHigh]);
     }
-    // at the greatest force that is too hard, at the others it is not what was asked for; 1.2 times the least force is within what
-    // P_DC may be off
+    // at the greatest force that is too hard, at the others it is not what was asked for; 1.2 times the least force is
+    // within what P_DC may be off
     let either = &[Fault::ForceHigh, Fault::ArmOff];
     ends_in(Misbehaves::Presses(1.4), either);
 }

@@ -1,5 +1,5 @@
-//! Expected outcomes computed from stored degrees of confusion are those computed without them, to the bit: on the worlds
-//! and on recordings.
+//! Expected outcomes computed from stored degrees of confusion are those computed without them, to the bit: on the
+//! worlds and on recordings.
 
 use tactus_core::explorer::{Config, ExpectedOutcome};
 use tactus_lab::data::properties::PropertyTable;

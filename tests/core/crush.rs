@@ -31,7 +31,8 @@ fn homed_again_and_again(rig: &mut SimRig, times: u32) -> f64 {
     rig.world().truth().force_max_n
 }
 
-/// Up is down. The first homing presses until the guard sees it; the zero that it began with must not be forgotten then.
+/// Up is down. The first homing presses until the guard sees it; the zero that it began with must not be forgotten
+/// then.
 #[test]
 fn a_homing_that_goes_down_adds_no_force_to_the_last_one() {
     assert_all(seeds(50).collect(), |&seed| {
@@ -68,8 +69,8 @@ fn sample(seed: u64) -> Setup {
     }
 }
 
-/// DIR turns round while the finger hangs over its sample: when it goes up to its switch, to wait there, it comes down. P_DC sees
-/// it; where that is dead, too, the spring of the mount holds it.
+/// DIR turns round while the finger hangs over its sample: when it goes up to its switch, to wait there, it comes down.
+/// P_DC sees it; where that is dead, too, the spring of the mount holds it.
 #[test]
 fn a_finger_that_is_parked_downwards_is_given_up_in_time() {
     for (dead, limits_n) in [(false, 0.05..0.5), (true, 0.0..2.2)] {

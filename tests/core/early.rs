@@ -132,7 +132,8 @@ fn a_rig_slides_less_and_is_as_right() {
     assert!(after.sliding_s < before.sliding_s);
     assert!(after.rig_s < before.rig_s);
     assert!(after.most_n < 2.2);
-    // both ways see the same slides up to the one that ends early: what differs, differs by three standard errors at most
+    // both ways see the same slides up to the one that ends early: what differs, differs by three standard errors at
+    // most
     let worse = |of: fn(&Sums) -> f64| {
         let each: Vec<f64> = sums.iter().map(|[b, a]| of(a) - of(b)).collect();
         let mean = each.iter().sum::<f64>() / each.len() as f64;

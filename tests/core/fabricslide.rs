@@ -32,8 +32,8 @@ fn the_fabrics_share_15_movements() {
     assert!(slides.next().is_none());
 }
 
-/// Made by another program (numpy) from the same files: a slide that is shorter than a frame, a whole one, then the mean of
-/// all 420 slides; eight bands, three properties.
+/// Made by another program (numpy) from the same files: a slide that is shorter than a frame, a whole one, then the
+/// mean of all 420 slides; eight bands, three properties.
 #[test]
 fn slides_measure_as_another_program_does() {
     let Some(folder) = data("fabricslide") else {

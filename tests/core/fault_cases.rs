@@ -88,8 +88,8 @@ fn a_case_says_what_broke() {
     assert!(nothing.wrong.is_empty(), "{:?}", nothing.wrong);
 }
 
-/// The judge goes by the world: a driver that steps down by itself while the finger slides, and a rig that does not look at the
-/// force.
+/// The judge goes by the world: a driver that steps down by itself while the finger slides, and a rig that does not
+/// look at the force.
 #[test]
 fn a_rig_without_a_guard_fails() {
     let case = Case {
@@ -113,8 +113,8 @@ fn a_rig_without_a_guard_fails() {
     assert!(unguarded.wrong.iter().any(pressed), "{unguarded}");
 }
 
-/// P_DC that drifts while it is measured in the air: with those constants a finger that drifts no more would be one that is
-/// pressed.
+/// P_DC that drifts while it is measured in the air: with those constants a finger that drifts no more would be one
+/// that is pressed.
 #[test]
 fn a_calibration_with_a_drifting_pressure_is_refused() {
     let cases = [
@@ -129,7 +129,8 @@ fn a_calibration_with_a_drifting_pressure_is_refused() {
     }
 }
 
-/// Cases of the campaign that have failed once. Where no guard sees what happens, the spring of the mount holds the finger.
+/// Cases of the campaign that have failed once. Where no guard sees what happens, the spring of the mount holds the
+/// finger.
 #[test]
 fn the_spring_holds_a_finger_that_no_guard_sees() {
     let weak = Fault::PdcWeak {
@@ -152,8 +153,8 @@ fn the_spring_holds_a_finger_that_no_guard_sees() {
     the_spring_holds(14_559, Activity::Train, 13, &faults);
 }
 
-/// The wire of DIR goes wrong while the finger is down, or while it is lifted and its switch then says that it is at the top:
-/// the fault says how the finger is freed.
+/// The wire of DIR goes wrong while the finger is down, or while it is lifted and its switch then says that it is at
+/// the top: the fault says how the finger is freed.
 #[test]
 fn an_inverted_lever_is_told_with_its_knob() {
     let closed = Fault::LeverTopStuck { closed: true };
@@ -207,8 +208,8 @@ fn what_is_repaired_at_a_fault_does_not_keep_the_rig_from_homing() {
     ends_well(9_139, Activity::Train, 85, &faults);
 }
 
-/// A driver that steps down by itself while the stage's current is measured without load, and after it while the rig waits: the
-/// finger is lifted, or the fault says how it is freed.
+/// A driver that steps down by itself while the stage's current is measured without load, and after it while the rig
+/// waits: the finger is lifted, or the fault says how it is freed.
 #[test]
 fn a_lever_that_runs_down_by_itself_is_seen() {
     assert_all(seeds(50).collect(), |&n| {
@@ -229,7 +230,8 @@ fn a_lever_that_runs_down_by_itself_is_seen() {
     ends_well(283, Activity::Calibrate, 69, &faults);
 }
 
-/// A driver that steps down by itself while P_DC is dead or says too little: the limit switch opens under the lifted lever.
+/// A driver that steps down by itself while P_DC is dead or says too little: the limit switch opens under the lifted
+/// lever.
 #[test]
 fn a_runaway_lever_without_a_pressure_is_seen() {
     let failed_once = [100_628, 200_195, 200_349].map(Case::draw);

@@ -282,7 +282,8 @@ fn phases() -> impl Iterator<Item = (&'static Case, When)> {
 
 #[test]
 fn every_fault_is_noticed_in_time_and_does_no_harm() {
-    // three rejected slides: with the exploration, in the core; tasks that hang: on the emulated board; an arm's: arm.rs
+    // three rejected slides: with the exploration, in the core; tasks that hang: on the emulated board; an arm's:
+    // arm.rs
     let elsewhere = [
         Fault::Rejected,
         Fault::TasksHung,
@@ -399,8 +400,8 @@ fn a_reset_or_a_stop_does_not_leave_the_finger_down() {
     );
 }
 
-/// A switch that says "at the top" everywhere, and somebody who homes again and again: the lever must not take each place
-/// for a lower top, until its zero is taken under load.
+/// A switch that says "at the top" everywhere, and somebody who homes again and again: the lever must not take each
+/// place for a lower top, until its zero is taken under load.
 #[test]
 fn a_stuck_switch_and_a_stubborn_operator_do_not_let_the_lever_creep_down() {
     let mut rig = pressed(Unguarded::default());
@@ -417,8 +418,8 @@ fn a_stuck_switch_and_a_stubborn_operator_do_not_let_the_lever_creep_down() {
     assert!(truth.indentation_mm < 0.0, "{} mm", truth.indentation_mm);
 }
 
-/// What makes the count of steps wrong, either way, and many times over: once it is repaired and homed, the rig presses as
-/// before.
+/// What makes the count of steps wrong, either way, and many times over: once it is repaired and homed, the rig presses
+/// as before.
 #[test]
 fn steps_that_were_lost_do_not_add_up() {
     let causes = [
@@ -450,8 +451,8 @@ fn steps_that_were_lost_do_not_add_up() {
     });
 }
 
-/// A force over the limit that lasts while the lever goes up, because somebody leans on it: it must go on, and it did not
-/// even begin where another fault had come first. One that rises while it goes up is the lever's own: it must stop.
+/// A force over the limit that lasts while the lever goes up, because somebody leans on it: it must go on, and it did
+/// not even begin where another fault had come first. One that rises while it goes up is the lever's own: it must stop.
 #[test]
 fn a_force_that_lasts_does_not_end_the_lifting() {
     // counts of P_DC per ms of lifting
@@ -501,8 +502,8 @@ fn reboot(rig: &mut SimRig, calibration: RigCalibration, unguarded: Unguarded) {
     );
 }
 
-/// The wire of the lever's switch breaks, and the chip starts again while the finger presses: to the firmware it is at the
-/// top. Only P_DC says that it is not, to a rig that knows what its finger says in the air.
+/// The wire of the lever's switch breaks, and the chip starts again while the finger presses: to the firmware it is at
+/// the top. Only P_DC says that it is not, to a rig that knows what its finger says in the air.
 #[test]
 fn a_finger_that_is_not_in_the_air_is_neither_dragged_nor_pressed_further() {
     let booted = |unguarded, like_the_firmware: bool| {
@@ -635,8 +636,8 @@ fn a_finger_far_from_the_default_can_be_homed_and_calibrated() {
     rig.home().unwrap();
 }
 
-/// Before there is a zero the force is what P_DC has risen by. A finger that is down when the chip starts must not be the
-/// measure of that once it is lifted.
+/// Before there is a zero the force is what P_DC has risen by. A finger that is down when the chip starts must not be
+/// the measure of that once it is lifted.
 #[test]
 fn a_finger_that_nobody_calibrated_is_guarded_before_its_first_zero() {
     let pressed_by_a_runaway = |down_at_boot: bool, unguarded| {
@@ -765,8 +766,8 @@ fn a_rig_may_idle_for_long() {
     rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
 }
 
-/// One movement by the world's own reckoning: how it ended, and the mean force of the still finger and of the slide, N. A
-/// lever that runs down does so from this ms of the slide on.
+/// One movement by the world's own reckoning: how it ended, and the mean force of the still finger and of the slide, N.
+/// A lever that runs down does so from this ms of the slide on.
 fn forces_of(
     seed: u64,
     unguarded: Unguarded,
@@ -814,7 +815,8 @@ fn the_force_of_a_sound_slide_is_that_of_the_still_finger() {
     });
 }
 
-/// A driver that steps down by itself, even in a slide of one second: what counts was made with the force that was asked for.
+/// A driver that steps down by itself, even in a slide of one second: what counts was made with the force that was
+/// asked for.
 #[test]
 fn a_slide_during_which_the_lever_runs_down_does_not_count() {
     let counts_wrongly = |seed: u64, unguarded| {

@@ -1,5 +1,5 @@
-//! Decisions of the core, with its fixed-point tables and arithmetic, beside oracles that compute the paper's equations and
-//! the fused recipe in f64 from the training slides themselves.
+//! Decisions of the core, with its fixed-point tables and arithmetic, beside oracles that compute the paper's equations
+//! and the fused recipe in f64 from the training slides themselves.
 
 use rand::Rng as _;
 use rayon::prelude::*;

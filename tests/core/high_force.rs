@@ -1,4 +1,5 @@
-//! Movements of up to 2 N, for a rig whose finger's mount yields: asked of the probe, judged by the world's force on the finger.
+//! Movements of up to 2 N, for a rig whose finger's mount yields: asked of the probe, judged by the world's force on
+//! the finger.
 
 use std::cell::RefCell;
 

@@ -1,4 +1,5 @@
-//! Hands that do not hold their speed, with a sensor of it, without one, and with one that has lost track, in the simulated world.
+//! Hands that do not hold their speed, with a sensor of it, without one, and with one that has lost track, in the
+//! simulated world.
 
 use rayon::prelude::*;
 use tactus_core::explorer::Method;
@@ -16,8 +17,8 @@ const TRIALS: usize = 15;
 /// Explorations of each texture.
 const EXPLORED: usize = 2;
 
-/// A hand with these deviations of ln(pace) and ln(force) from slide to slide, and a sensor of motion, which 1.25 mm of height put off by
-/// 5 %.
+/// A hand with these deviations of ln(pace) and ln(force) from slide to slide, and a sensor of motion, which 1.25 mm of
+/// height put off by 5 %.
 fn hand(pace_spread: f64, force_spread: f64) -> Manner {
     Manner {
         pace_spread,
@@ -63,8 +64,8 @@ fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
     }
 }
 
-/// Explorations of these textures in a world: without a sensor of speed, with it, and without it by the table that was learned
-/// with it.
+/// Explorations of these textures in a world: without a sensor of speed, with it, and without it by the table that was
+/// learned with it.
 fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
     let collection = Collection {
         seed,

@@ -221,8 +221,8 @@ fn a_movement_by_hand_is_measured_and_a_stop_lifts() {
     assert_eq!(explore(&mut session, 1, 2)["told"], "sure");
 }
 
-/// With TACTUS_PAGE_REPLIES, `cargo xtask test --step page` asks the same in WebAssembly and compares the replies byte by byte: of
-/// some seeds, each another texture, then a lesson, at last the paper's method.
+/// With TACTUS_PAGE_REPLIES, `cargo xtask test --step page` asks the same in WebAssembly and compares the replies byte
+/// by byte: of some seeds, each another texture, then a lesson, at last the paper's method.
 #[test]
 fn replies() {
     let mut session = Session::default();

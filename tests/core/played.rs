@@ -1,5 +1,5 @@
-//! Real recordings as what the finger of the simulated rig feels: how faithfully they are played, and how well the paper's
-//! method tells real materials by them.
+//! Real recordings as what the finger of the simulated rig feels: how faithfully they are played, and how well the
+//! paper's method tells real materials by them.
 
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;
@@ -87,8 +87,8 @@ fn what_is_cut_is_counted() {
     assert_eq!(rig.world().played().slides, 0);
 }
 
-/// The stretch of a whole recording that the rig feels, s: its steady part begins so long after the recording's, and ends
-/// after 3 s of constant speed.
+/// The stretch of a whole recording that the rig feels, s: its steady part begins so long after the recording's, and
+/// ends after 3 s of constant speed.
 const STRETCH_S: (f32, f32) = (0.5 + 0.225, 0.5 + 3.025);
 
 /// The same slide, of which this stretch counts.

@@ -1,7 +1,7 @@
 //! Presses on soft and hard things, with P_DC sound, dead, dying and leaking. What counts is the world's own force.
 //!
-//! The whole campaign takes about an hour: `cargo xtask campaign press`, which gives a world by `TACTUS_PRESSES_WORLD`; every
-//! seventh rig of it with `TACTUS_PRESSES_EVERY=7`.
+//! The whole campaign takes about an hour: `cargo xtask campaign press`, which gives a world by `TACTUS_PRESSES_WORLD`;
+//! every seventh rig of it with `TACTUS_PRESSES_EVERY=7`.
 
 use rayon::prelude::*;
 use tactus_core::features::Movement;
@@ -149,7 +149,8 @@ fn no_leak_of_a_tenth_of_a_second_or_more_presses_too_hard() {
     });
 }
 
-/// Over seconds a leak looks like a sample that gives way: beyond the probe's forces the lever stands on its way and looks.
+/// Over seconds a leak looks like a sample that gives way: beyond the probe's forces the lever stands on its way and
+/// looks.
 #[test]
 fn no_slow_leak_presses_too_hard_at_two_newtons() {
     const SECONDS: [f64; 12] = [

@@ -1,4 +1,5 @@
-//! A table after the finger was replaced: what the probe is told of simulated textures before and after it was refreshed.
+//! A table after the finger was replaced: what the probe is told of simulated textures before and after it was
+//! refreshed.
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
@@ -93,8 +94,8 @@ fn slides(world: &Collection, table: Table<'_>, finger: Finger, count: usize) ->
     each.flatten().collect()
 }
 
-/// Of 50 worlds, 0.995 of the textures were told before, 0.001 with the new finger, 0.807 after one slide of each (by world 0.11),
-/// 0.476 after one of every second one (0.13), and 0.873 after three of each.
+/// Of 50 worlds, 0.995 of the textures were told before, 0.001 with the new finger, 0.807 after one slide of each (by
+/// world 0.11), 0.476 after one of every second one (0.13), and 0.873 after three of each.
 #[test]
 fn one_slide_of_each_texture_brings_most_of_a_replaced_fingers_table_back() {
     let mut sums = [0.0; 5];

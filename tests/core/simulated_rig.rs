@@ -137,8 +137,8 @@ fn a_recorded_slide_has_the_properties_measured_live() {
     assert_eq!(slide.finish().unwrap(), recorded);
 }
 
-/// The still finger's power is measured while the stage stands, so a stage's own vibration is taken for texture: roughness and
-/// fineness move with its amplitude, in standard deviations of a texture's trials.
+/// The still finger's power is measured while the stage stands, so a stage's own vibration is taken for texture:
+/// roughness and fineness move with its amplitude, in standard deviations of a texture's trials.
 #[test]
 fn a_stage_that_vibrates_is_taken_for_texture() {
     const TRIALS: u64 = 4;

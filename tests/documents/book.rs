@@ -1,5 +1,5 @@
-//! README, book and the recordings of the repository: generated parts are as the code has them, links lead somewhere, the
-//! commands in them exist.
+//! README, book and the recordings of the repository: generated parts are as the code has them, links lead somewhere,
+//! the commands in them exist.
 //!
 //! `TACTUS_BOOK=write` (`cargo xtask docs --write`) writes the generated parts, the recordings and the pictures.
 

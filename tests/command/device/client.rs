@@ -1,4 +1,5 @@
-//! The client that the book has beside the page of the link: 140 lines of Python, which know the messages from `wire.json` alone.
+//! The client that the book has beside the page of the link: 140 lines of Python, which know the messages from
+//! `wire.json` alone.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};

@@ -1,5 +1,5 @@
-//! The Python package at the probe in software. `cargo xtask test --step python` says which Python has it; without one there is
-//! nothing to test here.
+//! The Python package at the probe in software. `cargo xtask test --step python` says which Python has it; without one
+//! there is nothing to test here.
 
 use std::process::{Command, Output};
 

@@ -1,4 +1,5 @@
-//! What a page does with a probe at a port, `tactus_lab::remote`: its bytes are carried here, and it says what the command says.
+//! What a page does with a probe at a port, `tactus_lab::remote`: its bytes are carried here, and it says what the
+//! command says.
 
 use std::fs;
 use std::io::ErrorKind::{TimedOut, WouldBlock};
@@ -322,8 +323,8 @@ fn a_page_stops_a_probe_and_is_told_when_nobody_answers() {
     }
 }
 
-/// With TACTUS_PAGE_PORT, `cargo xtask test --step page` has a page speak to this probe: the address goes to that file, and the
-/// probe lives until standard input ends.
+/// With TACTUS_PAGE_PORT, `cargo xtask test --step page` has a page speak to this probe: the address goes to that file,
+/// and the probe lives until standard input ends.
 #[test]
 fn serves_a_page() {
     let Some(file) = std::env::var_os("TACTUS_PAGE_PORT") else {
