@@ -20,7 +20,7 @@ mod unix;
 use std::io::Write as _;
 use std::process::Stdio;
 
-use serde_json::{Value, json};
+use serde_json::Value;
 use tactus_core::table::Table;
 use tactus_core::wire::{self, Forget, PROTOCOL};
 use tactus_lab::sim::collection::texture_name;
@@ -298,23 +298,14 @@ fn a_probe_verifies_keeps_its_settings_and_is_refreshed() {
         &["no texture cheese; there are: "],
     );
 
-    for (line, share) in [
-        ("settings", Value::Null),
-        ("settings --false-alarm 0.25e-1", json!(0.025)),
-        ("settings --as-table", Value::Null),
+    for (line, share, said) in [
+        ("settings", None, "table's own"),
+        ("settings --false-alarm 0.25e-1", Some(0.025), "2.5 %"),
+        ("settings --as-table", None, "table's own"),
     ] {
-        bench.printed(line);
-        let asked = bench.asked();
-        let sets = asked.iter().rev().find_map(|command| match command {
-            wire::Command::SetFalseAlarm(share) => {
-                Some(json!(share.map(|s| f64::from(s * 1e3).round() / 1e3)))
-            }
-            _ => None,
-        });
-        assert!(
-            line == "settings" && sets.is_none() || sets == Some(share),
-            "{line}: {asked:?}"
-        );
+        assert_says(&bench.printed(line), &[said]);
+        let kept = bench.json("status", 0)["false_alarm"].as_f64();
+        assert_eq!(kept.map(|share| share as f32), share, "{line}");
     }
     // 2 N take somebody who says that the finger is safe
     assert_says(

@@ -2,7 +2,6 @@
 
 mod convert;
 mod device;
-mod examples;
 mod kills;
 mod offline;
 mod refusals;

@@ -147,12 +147,10 @@ fn simulated_recordings_are_learned_and_evaluated() {
 fn tables_and_features_are_objects() {
     let at = Scratch::new();
     // five slides are asked for by default, and there are three
-    let learned = at.json("learn --recordings SIMULATED --out table", 0);
-    assert_eq!(learned["textures"], 6);
-    assert_eq!(array(&learned["short"]).len(), 18);
-    assert_eq!(learned["short"][0]["slides"], 3);
+    let learned = at.printed("learn --recordings SIMULATED --out table");
+    assert_eq!(learned.matches("only 3 slides").count(), 18, "{learned}");
     let shown = at.json("table table", 0);
-    assert_eq!(shown["checksum"], learned["checksum"]);
+    assert_eq!(array(&shown["textures"]).len(), 6);
     assert_eq!(array(&shown["movements"]).len(), 3);
     let texture = &shown["textures"][0];
     assert_eq!(texture["movements"][0]["trials"], 3);
@@ -419,7 +417,7 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
             let moved = slide.map_or("moved", |slide| labels(fields[1], slide));
             Some(format!("{line},{moved}"))
         });
-        at.json("learn --recordings slides --train-slides 2 --out table", 0);
+        at.printed("learn --recordings slides --train-slides 2 --out table");
         let shown = at.json("table table", 0);
         let of = |t: &Value| {
             (

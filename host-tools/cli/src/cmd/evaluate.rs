@@ -18,7 +18,6 @@ mod experiment;
 mod novelty;
 mod verify;
 
-/// Plays the explorations that the arguments ask for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.lifelong && args.protocol != Protocol::Drift {
         // the first slides are learned from, all others come after them

@@ -2,7 +2,6 @@
 
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::ValueEnum;
 use serde::Serialize;
@@ -18,7 +17,6 @@ use tactus_study::slides::{Recorded, StudyWorld};
 use tactus_study::training::{Training, Worn};
 use tactus_study::{self as study, Study};
 
-use super::output::Format;
 use super::progress::{notice, with_progress};
 
 /// Make the paper's whole study on the simulated rig, and report it beside the published numbers
@@ -56,9 +54,6 @@ pub(crate) struct Args {
     /// How much one touch of a texture differs from the next, 0 to 3: the world's one free knob
     #[arg(long, value_name = "X", default_value_t = tactus_study::VARIATION, value_parser = variation)]
     variation: f64,
-    /// How to print the figures; json is what study.json holds
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
 impl Args {
@@ -78,7 +73,6 @@ impl Args {
     }
 }
 
-/// Parts of the study.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Stage {
     Pilot,
@@ -88,7 +82,6 @@ enum Stage {
     All,
 }
 
-/// Worlds from the first to the last.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Seeds(u64, u64);
 
@@ -114,14 +107,11 @@ fn variation(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The stages of a study, one after the other.
 struct Stages {
     /// those that are done are kept in it
     folder: report::Folder,
     all: usize,
     begun: usize,
-    /// what they took, for people to see: no part of the report, which is the same each time
-    times: Vec<(String, f64)>,
 }
 
 impl Stages {
@@ -153,16 +143,13 @@ impl Stages {
             notice(&format!("{name}: was done before the interruption"));
             return Ok(kept);
         }
-        let begun = Instant::now();
         let bar = format!("stage {} of {}: {name}", self.begun, self.all);
         let done = with_progress(length, bar, work).map_err(|e| e.in_stage(what))?;
         self.folder.keep(&file, &done)?;
-        self.times.push((name, begun.elapsed().as_secs_f64()));
         Ok(done)
     }
 }
 
-/// Makes a study, or a part of one, and writes its report.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let folder = report::Folder::prepare(&args.out, &command(args))?;
     let world = StudyWorld {
@@ -175,7 +162,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         folder,
         all: args.stages(worlds.len()),
         begun: 0,
-        times: Vec::new(),
     };
     let mut study = Study {
         version: env!("CARGO_PKG_VERSION"),
@@ -217,16 +203,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             study.worlds.push(row);
         }
     }
-    let Stages { folder, times, .. } = stages;
-    report::write(&study, folder)?;
-    match args.format {
-        Format::Json => out.write_all(report::json(&study)?.as_bytes())?,
-        Format::Text => print(args, &study, &times, out)?,
-    }
-    Ok(())
+    report::write(&study, stages.folder)?;
+    Ok(print(args, &study, out)?)
 }
 
-/// Pairs and identification.
 fn explore(
     args: &Args,
     world: StudyWorld,
@@ -270,12 +250,7 @@ fn command(args: &Args) -> String {
     )
 }
 
-fn print(
-    args: &Args,
-    study: &Study,
-    times: &[(String, f64)],
-    out: &mut impl Write,
-) -> std::io::Result<()> {
+fn print(args: &Args, study: &Study, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(
         out,
         "World {}, variation {}: {}",
@@ -304,12 +279,6 @@ fn print(
         writeln!(out, "World {}: pairs {:.1} %", world.seed, world.pairs)?;
         print_columns(&world.columns, out)?;
     }
-    for (what, seconds) in times {
-        writeln!(out, "{seconds:8.1} s  {what}")?;
-    }
-    if let Some(mib) = peak_mib() {
-        writeln!(out, "{mib:8.0} MiB at most")?;
-    }
     Ok(())
 }
 
@@ -326,14 +295,4 @@ fn print_columns(columns: &[Column], out: &mut impl Write) -> std::io::Result<()
         )?;
     }
     Ok(())
-}
-
-/// Most memory that this process has held, where the system tells.
-fn peak_mib() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kib: f64 = line.trim().strip_suffix(" kB")?.trim().parse().ok()?;
-    Some(kib / 1024.0)
 }

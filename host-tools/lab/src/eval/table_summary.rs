@@ -1,4 +1,4 @@
-//! The contents of a table as one object for programs: the JSON of `tactus table show`.
+//! The contents of a table as one object for programs: the JSON of `tactus table`.
 
 use serde::Serialize;
 use tactus_core::features::Property;

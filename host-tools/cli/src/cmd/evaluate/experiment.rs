@@ -109,20 +109,17 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Number of virtual explorations, or of sessions.
     pub(crate) fn runs(&self) -> u64 {
         self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })
     }
 }
 
-/// How novelty is tried.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Novelty {
     /// One texture after the other is left out of the table, or one group after the other with --left-out
     LeaveOneOut,
 }
 
-/// What is to be evaluated, and its name.
 pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     let (experiment, name) = if let Some(folder) = &args.fabrics {
         let set = FabricSet::open(folder)?;
@@ -157,7 +154,6 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     Ok((experiment.with_features(features), name))
 }
 
-/// What fused tables are to expect.
 pub(super) fn expected(args: &Args) -> Expected {
     Expected {
         drift: Some(args.expecting.drift),

@@ -16,7 +16,6 @@ use super::experiment::Args;
 use crate::cmd::output::{Format, print_json, verdict_rows};
 use crate::cmd::progress::with_progress;
 
-/// What `evaluate --novelty` prints.
 #[derive(Serialize)]
 struct NoveltyFigures {
     method: Method,
@@ -30,7 +29,6 @@ struct NoveltyFigures {
     novelty: Novelty,
 }
 
-/// What `evaluate --lifelong` prints.
 #[derive(Serialize)]
 struct LifelongFigures {
     method: Method,
@@ -40,7 +38,6 @@ struct LifelongFigures {
     lifelong: Vec<Lifelong>,
 }
 
-/// Leaves every texture out of the table in turn.
 pub(crate) fn leave_one_out(
     args: &Args,
     experiment: &Experiment,
@@ -107,7 +104,6 @@ pub(crate) fn leave_one_out(
     Ok(())
 }
 
-/// Plays sessions in which the probe goes on learning.
 pub(crate) fn lifelong(
     args: &Args,
     experiment: &Experiment,
@@ -169,7 +165,6 @@ fn print_lives(
     Ok(())
 }
 
-/// Verdicts on one line.
 fn in_words(verdicts: &Verdicts) -> String {
     let words = verdict_rows(verdicts);
     let words = words.map(|(name, share, remark)| format!("{name} {:.1} %{remark}", share * 100.0));
