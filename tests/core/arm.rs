@@ -181,7 +181,7 @@ fn samples() -> [u8; 2] {
 /// All bad arms end in this fault, with no slide that counts, and the world's force below what hurts the finger.
 fn ends_in(how: Misbehaves, faults: &[Fault]) {
     // learned here: a thread of the pool that waited for the table would be one that is to learn it
-    samples().map(known);
+    let _ = samples().map(known);
     let runs = samples()
         .into_iter()
         .flat_map(|texture| (1..=3).map(move |seed| (texture, seed)));

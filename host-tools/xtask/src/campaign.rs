@@ -11,7 +11,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
-use crate::shell::{cargo, hear, root, run, target};
+use crate::shell::{hear, root, run};
 use crate::{emulate, firmware, page};
 pub(crate) use factory::{FOLDER, TABLES};
 

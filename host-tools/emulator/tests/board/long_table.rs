@@ -5,6 +5,7 @@ use std::path::Path;
 
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerName;
 use tactus_core::table::{Change, Name, Table, amend};
 use tactus_core::wire::{Command, Forget, Identify, Train};
 use tactus_emulator::board::FlashWrite;

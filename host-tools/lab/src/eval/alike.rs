@@ -17,7 +17,7 @@ pub struct Alike {
     /// Share of slides of the one that would be taken for the other's, were these two the only ones, at the movement
     /// that tells them apart best. 0 where they never are, 0.5 where it is a guess; more where the other was learned
     /// from more slides.
-    pub(crate) taken_for: f64,
+    pub taken_for: f64,
     /// Contact force of that movement.
     pub force_n: f32,
     /// Its speed.

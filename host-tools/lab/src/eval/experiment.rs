@@ -397,7 +397,7 @@ impl Experiment {
 
     /// As [`Experiment::run`], with training slides of its own: for callers that learn a table for each run anyway.
     /// Runs are independent then.
-    pub(crate) fn run_alone(&self, run: u64) -> Run<'_> {
+    pub fn run_alone(&self, run: u64) -> Run<'_> {
         let mut alone = self.begin(run);
         alone.orders = self.orders(&mut alone.random);
         alone

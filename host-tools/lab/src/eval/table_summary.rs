@@ -25,13 +25,14 @@ pub struct TableSummary {
     false_alarm: Option<f32>,
     /// Lengths of shorter slides that it has statistics of, s at constant speed.
     pub(crate) lengths_s: Vec<f64>,
-    pub(super) movements: Vec<MovementSummary>,
+    /// Its movements, in the order of the table.
+    pub movements: Vec<MovementSummary>,
     /// The textures, in the order of the table.
     pub(super) textures: Vec<TextureSummary>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub(crate) struct MovementSummary {
+pub struct MovementSummary {
     force_n: f32,
     speed_mm_s: f32,
 }
