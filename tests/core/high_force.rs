@@ -9,7 +9,7 @@ use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Properties, Property, PropertySet};
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Refused, RigError};
-use tactus_core::table::{Experience, Texture, encode};
+use tactus_core::table::{Experience, encode};
 use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_lab::sim::press::{Bench, FORCE_LIMIT_N, Press, Trouble};
@@ -35,7 +35,7 @@ fn table() -> Vec<u8> {
         [experience]
     });
     let textures = ["smooth", "rough"].into_iter().zip(&learned);
-    let textures = textures.map(|(name, experience)| Texture { name, experience });
+    let textures = textures.map(|(name, known)| (name, &known[..]));
     let mut buffer = [0; 256];
     let table = encode(&mut buffer, traction, &[two_newtons()], textures);
     table.unwrap().as_bytes().to_vec()

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use tactus_core::dsp::{BIN_HZ, Plan, TAPS, Taps};
+use tactus_core::dsp::{BAND_PASS, BIN_HZ, Plan, TAPS};
 use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
@@ -200,10 +200,9 @@ fn example(
     let (steady, pac) = (slide.steady(RATE_HZ), slide.pac());
     let length = (SHOWN_S * RATE_HZ as f32) as usize;
     let shown = steady.start..(steady.start + length).min(steady.end);
-    let taps = Taps::band_pass();
     let filtered = |at: usize| -> f64 {
         let newest_first = pac[at + 1 - TAPS..=at].iter().rev();
-        let products = newest_first.zip(taps.as_slice());
+        let products = newest_first.zip(&BAND_PASS);
         let sum: f64 = products.map(|(x, h)| f64::from(*x) * f64::from(*h)).sum();
         sum / 32768.0
     };

@@ -17,8 +17,8 @@ pub struct Movement {
 
 /// The reasons why a force and a speed are not a movement of this rig.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum MovementError {
-    /// Contact force in mN outside [`Movement::FORCE_MN`].
     #[error(
         "contact force {} mN is outside {}..={} mN",
         .0,
@@ -26,7 +26,6 @@ pub enum MovementError {
         Movement::FORCE_MN.end()
     )]
     Force(u32),
-    /// Sliding speed in um/s outside [`Movement::SPEED_UM_S`].
     #[error(
         "sliding speed {} um/s is outside {}..={} um/s",
         .0,
@@ -36,7 +35,6 @@ pub enum MovementError {
     Speed(u32),
 }
 
-/// Force in mN and speed in um/s.
 impl TryFrom<(u16, u32)> for Movement {
     type Error = MovementError;
 
@@ -66,9 +64,7 @@ impl Movement {
     pub const FOR_ROUGHNESS: Self = Self::on_grid(1, 5);
 
     /// A movement of `force_mn` millinewtons and `speed_um_s` micrometres per second.
-    ///
-    /// # Errors
-    /// The first value that is out of its range.
+    /// Errors: the first value that is out of its range.
     #[inline(never)]
     pub const fn new(force_mn: u16, speed_um_s: u32) -> Result<Self, MovementError> {
         if force_mn < *Self::FORCE_MN.start() || force_mn > *Self::FORCE_MN.end() {
@@ -84,9 +80,7 @@ impl Movement {
     }
 
     /// A movement from newtons and millimetres per second, rounded to whole mN and um/s.
-    ///
-    /// # Errors
-    /// The first value that is out of its range; not-a-number is out of every range.
+    /// Errors: the first value that is out of its range; not-a-number is out of every range.
     pub fn from_si(force_n: f32, speed_mm_s: f32) -> Result<Self, MovementError> {
         // `as` saturates, and turns not-a-number into 0: both are refused below
         let force_mn = libm::roundf(force_n * 1e3) as u32;

@@ -34,7 +34,6 @@ pub struct Gaussians<'t> {
     /// Each `movements` after the one before.
     pub(super) trials: &'t [u8],
     pub(super) movements: usize,
-    /// Of the means.
     pub(super) step: f32,
 }
 

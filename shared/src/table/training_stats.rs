@@ -19,9 +19,7 @@ impl Experience {
     /// experience as it was.
     ///
     /// After 255 trials the older ones are slowly forgotten: each new one has the weight of one in 255.
-    ///
-    /// # Errors
-    /// The property of `measured` that the trial lacks.
+    /// Errors: the property of `measured` that the trial lacks.
     pub fn learn(&mut self, measured: PropertySet, trial: &Properties) -> Result<(), Property> {
         let mut next = *self;
         next.trials = self.trials.saturating_add(1);

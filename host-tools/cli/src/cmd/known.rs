@@ -31,16 +31,16 @@ pub(crate) struct Args {
 
 /// A texture, as it may be named.
 #[derive(Serialize)]
-struct Known {
+struct KnownTexture {
     number: u32,
     name: String,
 }
 
 /// Lists them.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let known: Vec<Known> = if let Some(folder) = &args.recordings {
+    let known: Vec<KnownTexture> = if let Some(folder) = &args.recordings {
         let set = RecordingSet::open(folder)?;
-        let of = |texture: &tactus_lab::data::recording::Texture| Known {
+        let of = |texture: &tactus_lab::data::recording::Texture| KnownTexture {
             number: texture.id,
             name: texture.name.clone(),
         };
@@ -50,13 +50,13 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         let table = read_table(file, &mut bytes)?;
         let known = (1..).zip(table.names());
         known
-            .map(|(number, name)| Known {
+            .map(|(number, name)| KnownTexture {
                 number,
                 name: name.to_owned(),
             })
             .collect()
     } else {
-        let of = |t: &tactus_world::textures::Named| Known {
+        let of = |t: &tactus_world::textures::Named| KnownTexture {
             number: t.number.into(),
             name: t.name.to_owned(),
         };
@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if args.format == Format::Json {
         return print_json(&known, out);
     }
-    for Known { number, name } in known {
+    for KnownTexture { number, name } in known {
         writeln!(out, "{number:>3} {name}")?;
     }
     Ok(())

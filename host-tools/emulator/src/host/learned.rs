@@ -13,7 +13,7 @@ use tactus_lab::sim::recorded::RecordedTexture;
 
 use super::args::{World, hex_sha256};
 use super::progress;
-use super::under_finger::{self, FirmwareData, KnownError, TRIALS, Unknown};
+use super::under_finger::{self, FirmwareData, LearnError, TRIALS, Unknown};
 
 /// The source of the textures.
 enum Textures {
@@ -32,7 +32,7 @@ pub struct Chosen {
 
 impl Chosen {
     /// Draws the values that the arguments leave open.
-    pub fn new(cli: &World) -> Result<Self, KnownError> {
+    pub fn new(cli: &World) -> Result<Self, LearnError> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
             let recorded_texture = under_finger::recordings(cli.method.method(), cli.seed)?;
@@ -45,7 +45,7 @@ impl Chosen {
         }
         let texture = match &cli.texture {
             Some(name) => {
-                texture_number(name).ok_or_else(|| KnownError::NoTexture(name.clone()))?
+                texture_number(name).ok_or_else(|| LearnError::NoTexture(name.clone()))?
             }
             None => random.random_range(1..=117),
         };
@@ -64,7 +64,7 @@ impl Chosen {
     }
 
     /// Calibration of the rig and table of the textures for a method, or the table of a file.
-    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<FirmwareData, KnownError> {
+    pub fn learn(&self, method: Method, table: Option<&Path>) -> Result<FirmwareData, LearnError> {
         let kept = self.kept_in(method);
         let mut known = match kept.as_deref().and_then(read) {
             Some(known) => known,
@@ -78,7 +78,7 @@ impl Chosen {
             }
         };
         if let Some(path) = table {
-            known.table = std::fs::read(path).map_err(|source| KnownError::Table {
+            known.table = std::fs::read(path).map_err(|source| LearnError::Table {
                 path: path.into(),
                 source,
             })?;
@@ -86,7 +86,7 @@ impl Chosen {
         Ok(known)
     }
 
-    fn learn_anew(&self, method: Method) -> Result<FirmwareData, KnownError> {
+    fn learn_anew(&self, method: Method) -> Result<FirmwareData, LearnError> {
         let bar;
         let known = match &self.textures {
             Textures::Simulated(finger, collection) => {

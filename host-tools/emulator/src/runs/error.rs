@@ -4,7 +4,7 @@ use crate::board;
 use crate::host::args::WriteError;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
-use crate::host::under_finger::KnownError;
+use crate::host::under_finger::LearnError;
 use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
@@ -18,7 +18,7 @@ pub(crate) enum RunError {
     #[error(transparent)]
     Board(#[from] board::Error),
     #[error(transparent)]
-    Known(#[from] KnownError),
+    Learn(#[from] LearnError),
     #[error(transparent)]
     Talk(#[from] TalkError),
     #[error(transparent)]

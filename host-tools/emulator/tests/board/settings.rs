@@ -2,7 +2,7 @@
 
 use tactus_core::features::{Movement, Properties, Property, PropertySet};
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::table::{Experience, Texture, encode};
+use tactus_core::table::{Experience, encode};
 use tactus_core::wire::{Command, Event, Identify, Train};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
@@ -86,7 +86,7 @@ fn hard_table() -> Vec<u8> {
         [experience]
     });
     let textures = ["smooth", "rough"].into_iter().zip(&learned);
-    let textures = textures.map(|(name, experience)| Texture { name, experience });
+    let textures = textures.map(|(name, known)| (name, &known[..]));
     let movement = Movement::new(1995, 15_849).unwrap();
     let mut buffer = [0; 256];
     let table = encode(&mut buffer, traction, &[movement], textures);

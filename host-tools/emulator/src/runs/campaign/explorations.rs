@@ -11,7 +11,7 @@ use tactus_lab::sim::recorded::RecordedTexture;
 use crate::board::Options;
 use crate::host::exploration::{Exploration, ExploreError, explore};
 use crate::host::talk::Talk;
-use crate::host::under_finger::{self, FirmwareData, KnownError, TRIALS, Unknown};
+use crate::host::under_finger::{self, FirmwareData, LearnError, TRIALS, Unknown};
 
 /// Textures of the simulated world's table.
 const AMONG: u8 = 20;
@@ -37,7 +37,7 @@ pub fn simulated(
     method: Method,
     seed: u64,
     done: impl Fn() + Sync,
-) -> Result<Group, KnownError> {
+) -> Result<Group, LearnError> {
     let collection = Collection {
         seed,
         textures: Collection::spread(1, AMONG),
@@ -64,7 +64,7 @@ pub fn recorded(
     count: usize,
     method: Method,
     seed: u64,
-) -> Result<Group, KnownError> {
+) -> Result<Group, LearnError> {
     let known = under_finger::recorded(recorded_texture, method.method())?;
     let unknown = (0..recorded_texture.names.len())
         .cycle()

@@ -5,7 +5,7 @@ use tactus_core::wire::{Reset, Verdict};
 use crate::board::{self, FlashWrite};
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
-use crate::host::under_finger::KnownError;
+use crate::host::under_finger::LearnError;
 
 /// Why there are no cuts to judge.
 #[derive(Debug, thiserror::Error)]
@@ -15,7 +15,7 @@ pub(crate) enum CutError {
     #[error(transparent)]
     Explore(#[from] ExploreError),
     #[error(transparent)]
-    Known(#[from] KnownError),
+    Learn(#[from] LearnError),
     #[error("the firmware did not {0}: nothing to cut")]
     Nothing(&'static str),
     #[error("{0}: the noted writes do not give the flash that the firmware left")]
