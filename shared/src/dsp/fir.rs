@@ -36,7 +36,7 @@ impl Default for BandPower {
 
 impl BandPower {
     /// Takes samples into the filter's memory without counting their power: what comes before the steady window.
-    pub fn prime(&mut self, plan: &Plan, samples: &[i16]) {
+    pub(crate) fn prime(&mut self, plan: &Plan, samples: &[i16]) {
         self.flush(plan);
         let (energy, outputs) = (self.energy, self.outputs);
         let last = samples.len().saturating_sub(HISTORY);

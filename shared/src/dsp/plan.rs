@@ -37,7 +37,7 @@ impl Plan {
     }
 
     /// Returns the angles for the spectrum.
-    pub fn angles(&self) -> &Angles {
+    pub(crate) fn angles(&self) -> &Angles {
         &self.angles
     }
 }
@@ -266,28 +266,6 @@ pub(super) mod tests {
             .map(|n| libm::round(response(n) / gain * 32768.0) as i16)
             .collect();
         assert_eq!(BAND_PASS[..], taps[..]);
-    }
-
-    #[test]
-    fn passes_20_to_700_hz() {
-        assert!((gain(360.0) - 1.0).abs() < 1e-3, "gain 1 in the middle");
-        for f in [100.0, 200.0, 330.0, 600.0] {
-            assert!((gain(f) - 1.0).abs() < 0.02, "{f} Hz: {}", gain(f));
-        }
-        for f in [770.0, 800.0, 1000.0, 1100.0] {
-            assert!(gain(f) < 0.01, "{f} Hz: {}", gain(f));
-        }
-        assert!((gain(700.0) - 0.5).abs() < 0.02, "half at the edge");
-        assert!(
-            (gain(0.0) - 0.41).abs() < 0.01,
-            "66th order is too short to stop DC: {}",
-            gain(0.0)
-        );
-    }
-
-    #[test]
-    fn coefficients_are_symmetric() {
-        assert!(BAND_PASS.iter().eq(BAND_PASS.iter().rev()));
     }
 
     #[test]

@@ -117,7 +117,7 @@ impl<'p> Slide<'p> {
     }
 
     /// Takes over all that another slide of the same movement has measured, by a plan of its own.
-    pub fn adopt(&mut self, other: &Slide<'_>) {
+    pub(crate) fn adopt(&mut self, other: &Slide<'_>) {
         self.next = other.next;
         self.still = other.still.clone();
         self.still_samples = other.still_samples;
@@ -221,7 +221,7 @@ impl<'p> Slide<'p> {
 
     /// The properties, when the steady part is over.
     pub fn finish(mut self) -> Result<Measurement, SlideError> {
-        self.measure(self.steady.end.saturating_sub(self.steady.start))
+        self.look(self.steady.end.saturating_sub(self.steady.start))
     }
 
     /// Samples of P_AC at constant speed that have come.
@@ -231,12 +231,7 @@ impl<'p> Slide<'p> {
 
     /// The properties of what has come so far, as of a slide whose steady part was not longer; of it so many samples of
     /// P_AC must be there. The slide goes on as if nobody had looked.
-    pub fn look(&mut self, samples: u32) -> Result<Measurement, SlideError> {
-        self.measure(samples)
-    }
-
-    #[inline(always)]
-    fn measure(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
+    pub fn look(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
         let got = self.spectrum.samples();
         if self.lost > 0 {
             return Err(SlideError::Gap(self.lost));

@@ -54,7 +54,7 @@ impl Counts {
     }
 
     /// The lower 12 bits of `word`; the upper 4 are ignored.
-    pub const fn from_low_bits(word: u16) -> Self {
+    pub(crate) const fn from_low_bits(word: u16) -> Self {
         Self(word & Self::MAX.0)
     }
 
@@ -64,7 +64,7 @@ impl Counts {
     }
 
     /// Returns whether the reading sits at an end of the range: the real voltage may lie beyond it.
-    pub const fn is_clipped(self) -> bool {
+    pub(crate) const fn is_clipped(self) -> bool {
         self.0 == Self::MIN.0 || self.0 == Self::MAX.0
     }
 }
@@ -149,7 +149,7 @@ impl Calibration {
     /// Counts of P_DC above the no-contact value at a contact force (fig. 3), where the lever stops; `None` beyond the
     /// linear range. Not rounded: a mean of P_DC resolves less than a count, and 2 N rounded to 174 counts would read
     /// as 2001 mN, beyond the linear range.
-    pub fn force_counts(&self, force_mn: u16) -> Option<f32> {
+    pub(crate) fn force_counts(&self, force_mn: u16) -> Option<f32> {
         let mn = f32::from(force_mn);
         (mn <= self.linear_mn).then_some(mn / self.force_mn_per_count)
     }

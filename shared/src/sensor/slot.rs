@@ -46,7 +46,7 @@ pub type Answer = heapless::Vec<u8, MAX_BYTES>;
 
 impl Transaction {
     /// A transaction with the first part of a finger.
-    pub const fn first_port(out: &'static [u8], answer: u8, gap_us: u32) -> Self {
+    pub(crate) const fn first_port(out: &'static [u8], answer: u8, gap_us: u32) -> Self {
         Self {
             port: 0,
             out,

@@ -203,7 +203,10 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Deletes what the probe has learned by itself: of the texture with this number of that lineage, or all of it.
-    pub async fn delete_self_learned(&mut self, of: Option<(u32, u16)>) -> Result<(), StoreError> {
+    pub(crate) async fn delete_self_learned(
+        &mut self,
+        of: Option<(u32, u16)>,
+    ) -> Result<(), StoreError> {
         let is_its =
             |record: &SelfLearnedRecord| of.is_none_or(|of| (record.lineage, record.number) == of);
         self.clear(is_its).await

@@ -75,7 +75,7 @@ impl Whitened {
     /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8
     /// of the recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is
     /// lost; 3 was chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
-    pub const MEMORY: u8 = 3;
+    pub(crate) const MEMORY: u8 = 3;
 
     /// Takes in a whitened slide of a training: all have the same weight.
     pub fn teach(&mut self, slide: &[i16]) {

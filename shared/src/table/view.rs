@@ -480,7 +480,7 @@ impl<'a> Table<'a> {
 
     /// The number that one more texture gets.
     #[inline]
-    pub fn next_number(&self) -> u16 {
+    pub(crate) fn next_number(&self) -> u16 {
         let numbers = (0..self.textures).map(|texture| self.number(texture));
         numbers.max().map_or(0, |most| most.wrapping_add(1))
     }

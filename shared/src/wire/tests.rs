@@ -127,49 +127,6 @@ fn the_longest_messages_fit() {
     }
 }
 
-/// By hand, as documented for the host: what a verdict and an answer are on the line.
-#[test]
-fn a_verdict_and_an_answer_have_these_bytes() {
-    let body = |message: &dyn Fn(&mut [u8]) -> usize| {
-        let mut buffer = [0; 64];
-        let length = message(&mut buffer);
-        buffer[..length].to_vec()
-    };
-    let verdict = report(Event::Verdict(Verdict {
-        texture: 300,
-        name: Name::try_from("oak").unwrap(),
-        probability: 0.5,
-        sure: false,
-        unknown: true,
-        log_odds: Some(2.0),
-        slides: 2,
-        wants_label: true,
-        changed: false,
-    }));
-    let bytes = body(&|buffer| postcard::to_slice(&verdict, buffer).unwrap().len());
-    // number 7, 1234 ms as a varint, variant 9, 300 as a varint, length and name, two f32, little-endian
-    assert_eq!(
-        bytes,
-        *b"\x07\xd2\x09\x09\xac\x02\x03oak\0\0\0\x3f\0\x01\x01\0\0\0\x40\x02\x01\0"
-    );
-    let answer = Request {
-        id: 5,
-        command: Command::Label(Name::try_from("elm").unwrap()),
-    };
-    let bytes = body(&|buffer| postcard::to_slice(&answer, buffer).unwrap().len());
-    assert_eq!(bytes, *b"\x05\x04\x03elm");
-    // looking at everything has no property; fineness is the variant 2
-    let look = |property| {
-        let action = Action {
-            movement: 2,
-            property,
-        };
-        body(&|buffer| postcard::to_slice(&action, buffer).unwrap().len())
-    };
-    assert_eq!(look(None), [2, 0]);
-    assert_eq!(look(Some(Property::Fineness)), [2, 1, 2]);
-}
-
 /// By hand: id 0x0102 as a varint 82 02, `Status` is variant 0; COBS by its definition; the CRC by another library.
 #[test]
 fn a_request_has_these_bytes() {

@@ -82,7 +82,7 @@ pub struct ErrorCode(pub u8);
 
 impl ErrorCode {
     /// The meaning; `None` of a code that no source names.
-    pub const fn meaning(self) -> Option<&'static str> {
+    pub(crate) const fn meaning(self) -> Option<&'static str> {
         Some(match self.0 {
             0x2D | 0x2E => {
                 "read too early: leave 50 us with chip select high between command and read"
