@@ -12,8 +12,7 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::pins::Inputs;
 use tactus_core::rig::stage::StageConstants;
 use tactus_core::rig::{Ended, FAULTS, Fault, Phase, Refused};
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::biotac;
 use tactus_core::sensor::pressure::{Calibration, Channel, Counts, Pressure};
 use tactus_lab::sim::rig::{SimError, SimRig};
 use tactus_tests::{count, seeds};
@@ -495,7 +494,7 @@ fn a_force_that_lasts_does_not_end_the_lifting() {
 /// The chip starts again, wherever lever and stage are.
 fn reboot(rig: &mut SimRig, calibration: RigCalibration, unguarded: Unguarded) {
     *rig.control() = Control::new(
-        &BioTac::MODEL,
+        &biotac::PARTS.model,
         StageConstants::REFERENCE,
         calibration,
         unguarded,

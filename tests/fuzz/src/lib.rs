@@ -271,7 +271,7 @@ fn used(store: &mut Store<Flash>, [what, how]: [u8; 2], buffer: &mut [u8]) {
             let _ = block_on(async {
                 store.begin_table(bytes.len()).await?;
                 store.write_table(0, bytes).await?;
-                store.commit_table(buffer).await.map(|_| ())
+                store.commit_table(None, buffer).await.map(|_| ())
             });
         }
         3 => {

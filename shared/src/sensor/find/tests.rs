@@ -1,6 +1,7 @@
 use std::vec::Vec;
 
 use super::*;
+use crate::sensor::{AnyFinger, BadWord};
 
 /// What a finger's parts say to those who look for one, by the first byte that is sent.
 fn found(says: impl Fn(FingerName, &Transaction) -> Vec<u8>) -> Option<FingerName> {
@@ -105,18 +106,16 @@ fn nobody_is_asked_what_could_harm_another_part() {
 }
 
 #[test]
-fn any_finger_reads_as_its_own_decoder() {
-    let mut any = AnyFinger::new(FingerName::Analog);
-    assert_eq!(
-        any.decode(1, &[0xE4, 0x56]).ok(),
-        Analog.decode(1, &[0xE4, 0x56]).ok()
-    );
-    let silent = any.decode(0, &[]).unwrap_err();
-    assert_eq!(silent.kind(), Some(BadWord::Silent));
-    let mut any = AnyFinger::new(FingerName::Biotac);
-    let garbled = any.decode(0, &[0x81, 0x01]).unwrap_err();
-    assert_eq!(garbled.kind(), Some(BadWord::Garbled));
-    assert_eq!(any.gravity(), None);
+fn errors_are_counted_by_their_kind() {
+    for (name, answer, kind) in [
+        (FingerName::Analog, &[][..], BadWord::Silent),
+        (FingerName::Biotac, &[0x81, 0x01], BadWord::Garbled),
+        (FingerName::Biotac, &[0xA5, 0x2D], BadWord::Refused),
+    ] {
+        let mut finger = AnyFinger::new(name);
+        let why = finger.decode(0, answer).unwrap_err();
+        assert_eq!((why.kind(), finger.gravity()), (Some(kind), None));
+    }
     for name in FingerName::ALL {
         assert_eq!(name.parts().model.name, name);
         let slots = name.parts().slots.len() as u32;
