@@ -57,12 +57,12 @@ test("WebAssembly gives the native replies, byte by byte", async () => {
   return `${explorations} explorations`;
 });
 
-test("memory stays flat over 200 explorations", async () => {
+test("memory stays flat over 60 explorations", async () => {
   const { ask, memory } = module();
   ask('{"do":"world","world":1,"textures":20,"paper":false,"drift":1,"trial":1}');
   ask('{"do":"prepare"}');
   const sizes = [];
-  for (let n = 1; n <= 200; n++) {
+  for (let n = 1; n <= 60; n++) {
     ask(`{"do":"identify","texture":${n % 117 + 1},"seed":${n},"threshold":0.99,"false_alarm":0.02,"max_slides":3}`);
     let frames = 0;
     for (let frame = '"busy":true'; frame.includes('"busy":true');) {
@@ -71,7 +71,7 @@ test("memory stays flat over 200 explorations", async () => {
     }
     sizes.push(memory.buffer.byteLength);
   }
-  const [early, late] = [sizes[19], sizes[199]];
+  const [early, late] = [sizes[19], sizes[59]];
   assert.ok(late - early <= 65536, `${early} to ${late} bytes`);
   return `${(late / 2 ** 20).toFixed(1)} MB`;
 });
@@ -157,6 +157,7 @@ test("worn skin is told as changed, then as new, and the scale says the same", (
   const all = [];
   // the band between the two limits is narrow: for some textures a step of wear crosses it
   for (const place of [0, 3, 6, 9]) {
+    if (all.length > 1 && all.some(told => told.includes("changed"))) break;
     const told = [];
     await set(it, "wear", "0");
     await set(it, "texture", String((await it.evaluate(NOW)).known.numbers[place]));
@@ -247,6 +248,27 @@ test("a probe at a serial port: status, identify, teach, verify, log", () => usb
   assert.ok(lines.some(({ report }) => report?.event?.Verdict), "no verdict in the log");
   return `${lines.length} lines of log`;
 }));
+
+// The page as it is, at each of these sizes in light and dark: nothing is clipped, every text can be read.
+async function looksRight(it, widths, seen) {
+  for (const width of widths) {
+    const height = width < 500 ? 844 : 900;
+    for (const scheme of ["light", "dark"]) {
+      await it.size(width, height, width < 500, scheme);
+      await new Promise(done => setTimeout(done, 250));
+      const at = `${width} ${scheme}`;
+      const wide = await it.evaluate("document.documentElement.scrollWidth");
+      assert.ok(wide <= width, `${wide} px in ${at}`);
+      assert.deepEqual(await it.evaluate(CLIPPED), [], at);
+      assert.deepEqual(await it.evaluate(CONTRAST), [], at);
+      if (width < 500) {
+        const small = await it.evaluate("[...document.querySelectorAll('button, select, input')].filter(e => e.offsetParent && e.offsetHeight < 36).map(e => e.id)");
+        assert.deepEqual(small, [], `too small for a finger: ${at}`);
+      }
+      await seen(width, scheme);
+    }
+  }
+}
 
 test("the lens's caption lies on nothing, wherever the stage is", () => opened("", { motion: "reduce" }, async it => {
   const found = await it.evaluate(`(() => {
@@ -442,34 +464,17 @@ const CLIPPED = `[...document.querySelectorAll("body *")].filter(e => !e.closest
   .map(e => e.tagName + "#" + e.id + "." + e.className + " " + e.textContent.trim().slice(0, 40))`;
 
 test("no clipped text, and contrast AA, at every width in light and dark", async () => {
-  for (const [width, height] of [[390, 844], [1280, 900]]) {
-    for (const source of ["usb"]) {
-      await opened("", { width, height, touch: width < 500, motion: "reduce", before: it => serial(it, probe) }, async it => {
-        await press(it, `from-${source}`);
-        assert.deepEqual(await it.evaluate(CLIPPED), [], `${width} ${source}`);
-        assert.deepEqual(await it.evaluate(CONTRAST), [], `${width} ${source}`);
-        assert.ok(await it.evaluate("document.documentElement.scrollWidth") <= width, `${width} ${source}`);
-        writeFileSync(join(folder, `screenshot-${source}-${width}.png`), await it.screenshot(true));
-      });
-    }
+  const shot = (it, name) => async (width, scheme) => writeFileSync(join(folder, `screenshot-${name}${width}-${scheme}.png`), await it.screenshot(true));
+  for (const source of ["usb"]) {
+    await opened("", { motion: "reduce", before: it => serial(it, probe) }, async it => {
+      await press(it, `from-${source}`);
+      await looksRight(it, [390, 1280], shot(it, `${source}-`));
+    });
   }
-  for (const width of WIDTHS) {
-    for (const scheme of ["light", "dark"]) {
-      await opened("#speed=max&x=40&seed=3", { width, height: width < 500 ? 844 : 900, touch: width < 500, scheme }, async it => {
-        await answered(it);
-        await new Promise(done => setTimeout(done, 250));
-        const wide = await it.evaluate("document.documentElement.scrollWidth");
-        assert.ok(wide <= width, `${wide} px in ${width}`);
-        assert.deepEqual(await it.evaluate(CLIPPED), [], `${width} ${scheme}`);
-        assert.deepEqual(await it.evaluate(CONTRAST), [], `${width} ${scheme}`);
-        if (width < 500) {
-          const small = await it.evaluate("[...document.querySelectorAll('button, select, input')].filter(e => e.offsetParent && e.offsetHeight < 36).map(e => e.id)");
-          assert.deepEqual(small, [], "too small for a finger");
-        }
-        writeFileSync(join(folder, `screenshot-${width}-${scheme}.png`), await it.screenshot(true));
-      });
-    }
-  }
+  await opened("#speed=max&x=40&seed=3", {}, async it => {
+    await answered(it);
+    await looksRight(it, WIDTHS, shot(it, ""));
+  });
 });
 
 /// Ends everything when the time is up, also while this thread computes without end.

@@ -149,7 +149,7 @@ impl Table {
         Ok(write_whole(&path, &self.bytes)?)
     }
 
-    /// What `tactus table show --format json` prints, as a dict: movements, textures, and what is known of each.
+    /// What `tactus table FILE --format json` prints, as a dict: movements, textures, and what is known of each.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         object(py, &TableSummary::new(self.read()?))
     }

@@ -7,7 +7,7 @@ use clap::ValueEnum as _;
 use tactus_core::explorer;
 use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
 use tactus_lab::eval::show::count;
-use tactus_study::pictures::evaluation::figures;
+use tactus_study::pictures::evaluation::confusion;
 
 use super::output::{Format, percent, print_json, verdict_rows};
 use super::progress::with_progress;
@@ -17,7 +17,6 @@ mod experiment;
 mod novelty;
 mod verify;
 
-/// Plays the explorations that the arguments ask for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
@@ -53,8 +52,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Format::Text => print_evaluation(&evaluation, out)?,
     }
     if let Some(canvas) = canvas {
-        let figures = figures(&courses, &names, args.stop.threshold)?;
-        canvas.write("tactus evaluate", &figures, out)?;
+        let figure = confusion(&courses, &names, args.stop.threshold)?;
+        canvas.write("tactus evaluate", &[figure], out)?;
     }
     Ok(())
 }

@@ -8,11 +8,14 @@ use tactus_core::sensor::FingerCode;
 use tactus_core::table::{
     self, Contents, Drift, Drifts, EncodeError, Experience, FALSE_ALARM, FINGER_LENGTH, Limits,
     Population, Scatter, Sections, Shorter, Table, Tail, WhitenError, Whitened, Whitening,
-    lengths_length, whiten_drifting, with_finger, with_lengths, with_sections,
+    whiten_drifting, with_finger, with_lengths, with_sections,
 };
 
 use super::calibrate::limits;
 use super::pace;
+
+/// Three sections, whose lengths are numbers of 16 bits.
+const MOST_SECTIONS: usize = 3 * (4 + u16::MAX as usize);
 
 /// Reasons why slides do not make a table.
 #[derive(Debug, thiserror::Error)]
@@ -140,7 +143,9 @@ pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec
         })
     });
     let shorter = shorter.collect::<Result<Vec<_>, EncodeError>>()?;
-    let mut out = vec![0; bytes.len() + lengths_length(&shorter)];
+    // a section is shorter than its table
+    let sections = shorter.iter().map(|shorter| shorter.table.as_bytes().len());
+    let mut out = vec![0; bytes.len() + sections.sum::<usize>()];
     let length = with_lengths(&mut out, &table, &shorter)?.as_bytes().len();
     out.truncate(length);
     Ok(out)
@@ -235,7 +240,7 @@ pub fn encode(
     let textures = names
         .iter()
         .zip(experience)
-        .map(|(name, experience)| table::Texture { name, experience });
+        .map(|(name, known)| (name.as_str(), &known[..]));
     let mut bytes = buffer(Contents::Gaussians(measured), names, movements.len());
     table::encode(&mut bytes, measured, movements, textures)?;
     Ok(bytes)
@@ -323,8 +328,11 @@ fn learn_fused(
             novelty,
             slopes: whitened.as_ref().map(pace::Whitened::slopes),
         };
-        let mut bytes = vec![0; plain.as_bytes().len() + sections.length(features)];
-        with_sections(&mut bytes, &plain, &sections)?;
+        let mut bytes = vec![0; plain.as_bytes().len() + MOST_SECTIONS];
+        let length = with_sections(&mut bytes, &plain, &sections)?
+            .as_bytes()
+            .len();
+        bytes.truncate(length);
         Ok::<_, EncodeError>(bytes)
     };
     let Some(populations) = populations else {

@@ -46,7 +46,6 @@ pub fn advice(stayed: &[&str]) -> Option<String> {
 mod tests {
     use tactus_core::explorer::Method;
     use tactus_core::features::{Movement, Observation, Properties};
-    use tactus_core::table::samples_length;
 
     use super::*;
     use crate::eval::learn::learn;
@@ -81,7 +80,7 @@ mod tests {
                 (read.drift(), read.limits()),
                 (before.drift(), before.limits())
             );
-            assert_eq!(noted.len(), plain.len() + samples_length(3));
+            assert_eq!(noted.len(), plain.len() + 4 + 5 * 3);
             // taken back, only its ancestor is named
             let again = note(&noted, |_| None).unwrap();
             assert_eq!(again.len(), plain.len());

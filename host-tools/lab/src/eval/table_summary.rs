@@ -1,4 +1,4 @@
-//! The contents of a table as one object for programs: the JSON of `tactus table show`.
+//! The contents of a table as one object for programs: the JSON of `tactus table`.
 
 use serde::Serialize;
 use tactus_core::features::Property;
@@ -25,19 +25,16 @@ pub struct TableSummary {
     false_alarm: Option<f32>,
     /// Lengths of shorter slides that it has statistics of, s at constant speed.
     pub(crate) lengths_s: Vec<f64>,
-    /// The movements.
+    /// Its movements, in the order of the table.
     pub movements: Vec<MovementSummary>,
     /// The textures, in the order of the table.
     pub(super) textures: Vec<TextureSummary>,
 }
 
-/// A movement of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MovementSummary {
-    /// Contact force.
-    pub force_n: f32,
-    /// Speed.
-    pub speed_mm_s: f32,
+    force_n: f32,
+    speed_mm_s: f32,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -7,7 +7,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Answer, Config, Explorer, Strategy};
 use tactus_core::features::{Observation, Vector, WHITE_STEPS};
-use tactus_core::table::{Change, Contents, EncodeError, Known, Table, Tally, Whitened, amend};
+use tactus_core::table::{
+    Change, Contents, EncodeError, Table, Tally, TextureStats, Whitened, amend,
+};
 
 use crate::data::replay::MeasuredSlide;
 use crate::eval::evaluate::{EvaluateError, explorer};
@@ -288,7 +290,7 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     let mut bytes = vec![0; table.as_bytes().len() + MOST_OF_ONE];
     let change = Change::Put {
         name,
-        known: Known::Fused(&known),
+        known: TextureStats::Fused(&known),
         tally: Tally::default(),
     };
     let length = amend(&mut bytes, &table, change)?.as_bytes().len();

@@ -19,8 +19,7 @@ use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault as Named, Phase};
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::biotac;
 use tactus_core::store::StoreError;
 use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 
@@ -469,7 +468,7 @@ fn repaired(
 ) {
     probe.rig.servo.rig().world().clear();
     // a sensor that is plugged in again starts up
-    for _ in 0..=BioTac::POWER_UP_MS {
+    for _ in 0..=biotac::PARTS.power_up_ms {
         probe.rig.servo.tick();
     }
     let mut homed = Ok(());

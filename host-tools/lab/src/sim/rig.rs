@@ -157,7 +157,7 @@ impl SimRig {
         &mut self.world
     }
 
-    /// Gravity along the finger by its decoder, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
+    /// Gravity along the finger by its decoder, counts of P_AC: see [`tactus_core::sensor::AnyFinger::gravity`].
     pub fn gravity(&self) -> Option<f32> {
         self.reader.gravity()
     }

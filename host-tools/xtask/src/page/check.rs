@@ -35,7 +35,7 @@ pub(crate) fn check() -> Result<()> {
     if let Err(why) = toolchain::get(BROWSER) {
         return skip(WHAT, &format!("{why:#}"));
     }
-    let built = build()?;
+    let built = build("tested")?;
     println!("== {} bytes of WebAssembly", built.wasm_bytes);
     // requests with their replies here, a line each
     let native = left_by(
@@ -54,7 +54,7 @@ pub(crate) fn check() -> Result<()> {
 /// Tries what the page does with a probe, with the emulated board in place of the one in software.
 pub(crate) fn emulated() -> Result<()> {
     let browser = browser()?;
-    let built = build()?;
+    let built = build("release")?;
     let probe = Probe::emulated()?;
     let (page, wasm) = (&built.page, &built.wasm);
     let arguments = [page, wasm, page].map(|path| path.as_os_str());

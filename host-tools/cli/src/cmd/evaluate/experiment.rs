@@ -39,8 +39,7 @@ is taken for new.
 does, and counts the errors: at the limits, and where both are equal.
 These need the method fused.
 
---plot draws what is told of each texture (confusion), how often it was right when it said 99 %
-(reliability). With --verify it draws one error against the other (trade-off).
+--plot draws what is told of each texture (confusion), or with --verify one error against the other (trade-off).
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
@@ -100,20 +99,17 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Number of virtual explorations, or of sessions.
     pub(crate) fn runs(&self) -> u64 {
         self.runs.unwrap_or(8000)
     }
 }
 
-/// How novelty is tried.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Novelty {
     /// One texture after the other is left out of the table, or one group after the other with --left-out
     LeaveOneOut,
 }
 
-/// What is to be evaluated, and its name.
 pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     let (experiment, name) = if let Some(folder) = &args.fabrics {
         let set = FabricSet::open(folder)?;
@@ -148,7 +144,6 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     Ok((experiment.with_features(features), name))
 }
 
-/// What fused tables are to expect.
 pub(super) fn expected(args: &Args) -> Expected {
     Expected {
         drift: Some(args.expecting.drift),

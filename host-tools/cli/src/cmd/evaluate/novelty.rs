@@ -15,7 +15,6 @@ use super::experiment::Args;
 use crate::cmd::output::{Format, print_json, verdict_rows};
 use crate::cmd::progress::with_progress;
 
-/// What `evaluate --novelty` prints.
 #[derive(Serialize)]
 struct NoveltyFigures {
     method: Method,
