@@ -151,7 +151,7 @@ pub fn play<const N: usize>(
 }
 
 /// As [`play`]; `each` gets every action and the explorer after it.
-pub fn play_with<const N: usize>(
+pub(crate) fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
     confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,

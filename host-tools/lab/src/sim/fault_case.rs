@@ -26,9 +26,8 @@ use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 use self::naming::Naming;
 use super::collection::Collection;
 use super::flash::{RamFlash, SECTOR, TABLE};
-use super::press::FORCE_LIMIT_N;
 use super::probe::{Host, SimProbe, switch_on};
-use super::rig::{SimError, SimRig};
+use super::rig::{FORCE_LIMIT_N, SimError, SimRig};
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;
 

@@ -23,6 +23,8 @@ use tactus_world::conditions::Conditions;
 use tactus_world::slot::Reader;
 use tactus_world::world::{Setup, World};
 
+/// Largest force that the finger ever bears, N.
+pub const FORCE_LIMIT_N: f64 = 2.2;
 const TICK_NS: u64 = 1_000_000;
 const PULSE_NS: u64 = 5_000;
 const DIR_NS: u64 = 2_000;
