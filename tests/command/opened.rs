@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{Cursor, Read as _};
+use std::io::Read as _;
 use std::path::Path;
-use std::process::Command;
 use std::sync::LazyLock;
 
 use flate2::read::GzDecoder;
-use mcap::records::Record;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use tactus_core::explorer::Method;
@@ -49,84 +47,16 @@ fn one_texture() -> Files {
 }
 
 /// A session's log.
-fn session() -> Vec<u8> {
+static SESSION: LazyLock<String> = LazyLock::new(|| {
     let packed = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../tests/golden/identify.jsonl.gz"
     );
-    let mut log = Vec::new();
+    let mut log = String::new();
     let mut packed = GzDecoder::new(fs::File::open(packed).unwrap());
-    packed.read_to_end(&mut log).unwrap();
+    packed.read_to_string(&mut log).unwrap();
     log
-}
-
-/// What `tactus convert` makes of it.
-fn mcap(from: &Path) -> Vec<u8> {
-    let temp = tempfile::tempdir().unwrap();
-    let to = temp.path().join("of.mcap");
-    let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    let out = tactus.arg("convert").arg(from).arg("--mcap").arg(&to);
-    let out = out.output().unwrap();
-    assert!(out.status.success(), "{out:?}");
-    fs::read(to).unwrap()
-}
-
-/// MCAP files of the session and of two recorded slides, with some of their samples.
-static CONVERTED: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
-    let temp = tempfile::tempdir().unwrap();
-    let log = temp.path().join("session.jsonl");
-    fs::write(&log, session()).unwrap();
-    let few = |file: Vec<u8>, slides: u32| {
-        let (mut features, mut samples) = (0, 0_u32);
-        again(&file, |topic, bytes| {
-            // those of a slide come after its samples
-            features += u32::from(topic == "/features");
-            let is_sample = ["/pac", "/pdc", "/shear"].contains(&topic);
-            samples += u32::from(is_sample);
-            (features <= slides && (!is_sample || samples.is_multiple_of(50))).then_some(bytes)
-        })
-    };
-    [
-        few(mcap(&log), u32::MAX),
-        few(mcap(Path::new(RECORDINGS)), 2),
-    ]
 });
-
-/// The same file with other messages and attachments: what is made of each, with its topic or name, or nothing.
-fn again(file: &[u8], mut changed: impl FnMut(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
-    let mut to = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
-    let mut channels = BTreeMap::new();
-    for record in mcap::read::ChunkFlattener::new(file).unwrap() {
-        match record.unwrap() {
-            Record::Channel(of) => {
-                let id = to.add_channel(0, &of.topic, "json", &BTreeMap::new());
-                channels.insert(of.id, (id.unwrap(), of.topic));
-            }
-            Record::Message { mut header, data } => {
-                let (id, topic) = &channels[&header.channel_id];
-                header.channel_id = *id;
-                if let Some(data) = changed(topic, data.into_owned()) {
-                    to.write_to_known_channel(&header, &data).unwrap();
-                }
-            }
-            Record::Attachment { header, data, .. } => {
-                if let Some(data) = changed(&header.name, data.into_owned()) {
-                    let attachment = mcap::Attachment {
-                        log_time: header.log_time,
-                        create_time: header.create_time,
-                        name: header.name,
-                        media_type: header.media_type,
-                        data: data.into(),
-                    };
-                    to.attach(&attachment).unwrap();
-                }
-            }
-            _ => {}
-        }
-    }
-    to.finish().unwrap();
-    to.into_inner().into_inner()
-}
 
 /// What no program of ours writes where there is a number, a name or a list.
 fn odd() -> impl Strategy<Value = Value> {
@@ -159,21 +89,6 @@ fn put(value: &mut Value, at: &mut impl Iterator<Item = usize>, odd: &Value) {
         Some(inner) => put(inner, at, odd),
         None => *value = odd.clone(),
     }
-}
-
-/// An MCAP file of another program.
-fn theirs() -> Vec<u8> {
-    let mut theirs = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
-    let channel = theirs.add_channel(0, "/camera", "json", &BTreeMap::new());
-    let header = mcap::records::MessageHeader {
-        channel_id: channel.unwrap(),
-        sequence: 0,
-        log_time: 1,
-        publish_time: 1,
-    };
-    theirs.write_to_known_channel(&header, b"{}").unwrap();
-    theirs.finish().unwrap();
-    theirs.into_inner().into_inner()
 }
 
 fn ask(remote: &mut Remote, files: &Files) -> Value {
@@ -333,21 +248,12 @@ fn recordings_are_shown_slide_by_slide_and_judged_by_tables_that_have_not_seen_t
 }
 
 #[test]
-fn a_deeper_folder_and_an_mcap_file_of_recordings_show_what_the_folder_shows() {
+fn a_deeper_folder_shows_what_the_folder_shows() {
     let folder = opened(&recordings("a/"));
     // files that lie there besides do no harm
     let mut files = recordings("deep/a/");
     files.insert("deep/notes.txt".to_owned(), b"notes".to_vec());
     assert_eq!(opened(&files)["happened"], folder["happened"]);
-    let mut remote = Remote::default();
-    let converted = ask(&mut remote, &one("of.mcap", mcap(Path::new(RECORDINGS))));
-    assert_eq!(converted["happened"], folder["happened"]);
-    let mut also = Remote::default();
-    ask(&mut also, &recordings("a/"));
-    for at in [0, 53] {
-        let asked = json!({"do": "recorded", "at": at}).to_string();
-        assert_eq!(remote.ask(&asked), also.ask(&asked));
-    }
 }
 
 #[test]
@@ -375,33 +281,7 @@ fn one_texture_is_judged_with_the_world_that_comes_with_the_page() {
 }
 
 #[test]
-fn an_mcap_file_of_a_log_shows_what_the_log_shows() {
-    let temp = tempfile::tempdir().unwrap();
-    let file = temp.path().join("session.jsonl");
-    fs::write(&file, session()).unwrap();
-    let log = opened(&one("session.jsonl", session()));
-    let converted = opened(&one("session.mcap", mcap(&file)));
-    for what in ["chosen", "slide", "verdict"] {
-        assert!(!of(&log, what).is_empty(), "{what}");
-        assert_eq!(of(&converted, what), of(&log, what), "{what}");
-    }
-    assert_eq!(converted["tables"][0][1]["crc"], log["tables"][0][1]["crc"]);
-    let said = converted["said"].as_str().unwrap();
-    assert_eq!(said, "1 exploration, 0 verifications.\n");
-}
-
-#[test]
 fn what_cannot_be_shown_is_told_with_what_to_do() {
-    let session = String::from_utf8(session()).unwrap();
-    let temp = tempfile::tempdir().unwrap();
-    // of a log without its table
-    let bare = temp.path().join("bare.jsonl");
-    let lines = session.lines().filter(|line| !line.contains("TablePart"));
-    fs::write(&bare, lines.collect::<Vec<_>>().join("\n")).unwrap();
-    let whole = mcap(Path::new(RECORDINGS));
-
-    let mut damaged = whole.clone();
-    damaged[whole.len() / 2] ^= 0x55;
     let mut without_manifest = recordings("a/");
     without_manifest.remove("a/manifest.csv");
     let mut without_file = recordings("a/");
@@ -412,23 +292,6 @@ fn what_cannot_be_shown_is_told_with_what_to_do() {
     unfinished.insert("a/INCOMPLETE".to_owned(), b"tactus device record".to_vec());
 
     for (files, wanted) in [
-        (
-            one("a.mcap", b"no file of that kind".to_vec()),
-            "a.mcap: this is no MCAP file: `tactus convert",
-        ),
-        (
-            one("a.mcap", theirs()),
-            "a.mcap: its channels are not those of Tactus (/camera): only what `tactus convert --mcap`",
-        ),
-        (
-            one("a.mcap", whole[..whole.len() / 2].to_vec()),
-            "a.mcap: the MCAP file is cut off: copy it again",
-        ),
-        (one("a.mcap", damaged), "a.mcap: the MCAP file is damaged ("),
-        (
-            one("a.mcap", mcap(&bare)),
-            "a.mcap: no table of the probe is in this MCAP file: convert the session's log again",
-        ),
         (
             without_manifest,
             "a: neither manifest.csv nor manifest.json in this folder",
@@ -463,49 +326,38 @@ proptest! {
     /// A panic would end the page's module. What comes is shown, or refused in a sentence.
     #[test]
     fn odd_messages_and_tables_never_panic(
-        // of recorded slides fewer: for them the table of a world is learned each time
-        of in prop_oneof![7 => Just(0_usize), 1 => Just(1)],
         odd in odd(),
-        topic in prop_oneof!["/pac", "/pdc", "/shear", "/movement", "/features", "/log", "/request", "/choice", "/posterior", "/verification", "/verdict", "table.tact"],
+        kind in prop_oneof!["Chosen", "SlideReport", "Verdict", "Block", "Identify", "TablePart"],
         every in 1_u32..4,
-        way in proptest::collection::vec(any::<usize>(), 0..4),
-        byte in any::<(usize, u8)>(),
+        way in proptest::collection::vec(any::<usize>(), 0..6),
     ) {
         let mut seen = 0;
-        let file = again(&CONVERTED[of], |of, mut bytes| {
-            seen += u32::from(of == topic);
-            if of != topic || !seen.is_multiple_of(every) {
-                return Some(bytes);
+        let lines = SESSION.lines().map(|line| {
+            seen += u32::from(line.contains(&kind));
+            if !line.contains(&kind) || !seen.is_multiple_of(every) {
+                return line.to_owned();
             }
-            match serde_json::from_slice::<Value>(&bytes) {
-                Ok(mut value) => {
-                    put(&mut value, &mut way.iter().copied(), &odd);
-                    bytes = serde_json::to_vec(&value).unwrap();
-                }
-                Err(_) => {
-                    let at = byte.0 % bytes.len();
-                    bytes[at] ^= byte.1;
-                }
-            }
-            Some(bytes)
+            let mut value: Value = serde_json::from_str(line).unwrap();
+            put(&mut value, &mut way.iter().copied(), &odd);
+            value.to_string()
         });
-        let reply = ask(&mut Remote::default(), &one("odd.mcap", file));
+        let log = lines.collect::<Vec<_>>().join("\n");
+        let reply = ask(&mut Remote::default(), &one("odd.jsonl", log.into_bytes()));
         prop_assert!(reply["is"] == "frame" || reply["why"].is_string(), "{reply}");
     }
 
     #[test]
     fn damaged_files_never_panic(
-        of in 0_usize..2,
         cut in any::<prop::sample::Index>(),
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..4),
     ) {
-        let mut file = CONVERTED[of].clone();
+        let mut file = SESSION.clone().into_bytes();
         for (at, byte) in changes {
             let at = at.index(file.len());
             file[at] ^= byte;
         }
         file.truncate(cut.index(file.len() + 1));
-        let reply = ask(&mut Remote::default(), &one("damaged.mcap", file));
+        let reply = ask(&mut Remote::default(), &one("damaged.jsonl", file));
         prop_assert!(reply["is"] == "frame" || reply["why"].is_string(), "{reply}");
     }
 }
@@ -521,13 +373,8 @@ fn leaves_files_for_a_page() {
     let _ = fs::remove_dir_all(folder);
     fs::create_dir_all(folder.join("no-manifest")).unwrap();
     let log = folder.join("session.jsonl");
-    fs::write(&log, session()).unwrap();
-    let recorded = mcap(Path::new(RECORDINGS));
+    fs::write(&log, SESSION.as_bytes()).unwrap();
     for (name, bytes) in [
-        ("session.mcap", mcap(&log)),
-        ("cut.mcap", recorded[..recorded.len() / 2].to_vec()),
-        ("recordings.mcap", recorded),
-        ("theirs.mcap", theirs()),
         ("some.txt", b"some".to_vec()),
         ("no-manifest/t001_s001_pac.npy", vec![0]),
     ] {

@@ -104,8 +104,7 @@ fn look(name: &str, svg: &str) {
                 && n.text()
                     .is_some_and(|s| s.contains("prefers-color-scheme:dark"))
         });
-        let is_outer = drawing.children().any(|n| is(&n, "svg"));
-        assert!(style || is_outer, "{name} has no dark colours");
+        assert!(style, "{name} has no dark colours");
     }
 }
 
@@ -172,19 +171,12 @@ fn pictures_can_be_read_and_change_nothing_else() {
             let svg = fs::read_to_string(Path::new(folder).join(name)).unwrap();
             look(&format!("{command:?}, {name}"), &svg);
         }
-        // all in one file; what is there is replaced
-        let file = temp.path().join("all.SVG");
-        let file = file.to_str().unwrap();
-        fs::write(file, "old").unwrap();
-        let (printed, said) = tactus(&[command, &["--quiet", "--plot", file][..]].concat());
+        // what is there is replaced
+        let (printed, said) = tactus(&[command, &["--quiet", "--plot", folder][..]].concat());
         assert_eq!(
             (plain.as_str(), ""),
-            (printed.as_str(), said.as_str()),
+            (&printed[..], &said[..]),
             "{command:?}"
-        );
-        look(
-            &format!("{command:?}, in one file"),
-            &fs::read_to_string(file).unwrap(),
         );
     }
 }
@@ -360,18 +352,11 @@ fn the_posterior_is_that_of_the_json() {
 #[test]
 fn the_map_names_the_nearest_texture() {
     let temp = tempfile::tempdir().unwrap();
-    let file = temp.path().join("map.svg");
-    let command = [
-        "table",
-        "show",
-        "tests/golden/paper.tact",
-        "--format",
-        "json",
-        "--plot",
-    ];
-    let (json, _) = tactus(&[&command[..], &[file.to_str().unwrap()]].concat());
+    let table = ["table", "tests/golden/paper.tact", "--format", "json"];
+    let folder = ["--plot", temp.path().to_str().unwrap()];
+    let (json, _) = tactus(&[&table[..], &folder].concat());
     let json: Value = serde_json::from_str(&json).unwrap();
-    let drawn = says(&fs::read_to_string(&file).unwrap());
+    let drawn = says(&fs::read_to_string(temp.path().join("map.svg")).unwrap());
     let textures = json["textures"].as_array().unwrap();
     assert!(textures.len() >= 3);
     assert_eq!(drawn.len(), textures.len());
@@ -408,33 +393,15 @@ fn the_map_names_the_nearest_texture() {
 #[test]
 fn a_place_that_cannot_be_drawn_to_is_told_before_the_work() {
     let temp = tempfile::tempdir().unwrap();
-    let path = |name: &str| temp.path().join(name).to_str().unwrap().to_owned();
-    fs::create_dir(path("folder.svg")).unwrap();
-    fs::write(path("mine"), "mine").unwrap();
-    for (target, code, hint) in [
-        (path("picture.png"), 2, "FILE.svg"),
-        (String::new(), 2, "FILE.svg"),
-        (path("folder.svg"), 1, "is a folder"),
-        (path("mine"), 1, "is a file"),
-        (path("mine/picture.svg"), 1, "cannot be written"),
-        (path("nowhere/picture.svg"), 1, "cannot be written"),
-        (path("mine/pictures"), 1, "cannot be written"),
-    ] {
-        let out = run(&[
-            "table",
-            "show",
-            "tests/golden/paper.tact",
-            "--plot",
-            &target,
-        ]);
+    let mine = temp.path().join("mine");
+    fs::write(&mine, "mine").unwrap();
+    for target in [mine.clone(), mine.join("pictures")] {
+        let target = target.to_str().unwrap();
+        let out = run(&["table", "tests/golden/paper.tact", "--plot", target]);
         let said = String::from_utf8(out.stderr).unwrap();
-        assert_eq!(out.status.code(), Some(code), "{target}: {said}");
-        assert!(
-            said.contains(hint) && !said.contains("panicked"),
-            "{target}: {said}"
-        );
+        assert_eq!(out.status.code(), Some(1), "{target}: {said}");
+        assert!(said.contains("cannot be written"), "{target}: {said}");
         assert!(out.stdout.is_empty(), "{target}");
     }
-    assert_eq!(fs::read_to_string(path("mine")).unwrap(), "mine");
-    assert_eq!(fs::read_dir(temp.path()).unwrap().count(), 2);
+    assert_eq!(fs::read_to_string(mine).unwrap(), "mine");
 }

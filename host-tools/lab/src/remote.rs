@@ -2,13 +2,9 @@
 //! came and the time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus
 //! device` does and says.
 
-#[cfg(feature = "open")]
-pub mod mcap;
 mod message;
-#[cfg(feature = "open")]
 mod open;
 pub mod operations;
-#[cfg(feature = "open")]
 mod recorded;
 mod replay;
 pub mod say;
@@ -17,6 +13,5 @@ pub mod verifying;
 mod work;
 
 pub use message::{File, Folder, Frame, Question, Reply, Request, Streams, Work};
-#[cfg(feature = "open")]
 pub use open::OpenError;
 pub use session::Remote;

@@ -26,7 +26,6 @@ Examples:
   cargo xtask campaign factory -- --write           makes the tables that come with the firmware, shared/tables/*.tact
   cargo xtask campaign fuzz -- table --seconds 60   one target";
 
-/// The page of the book that lists the results.
 const BOOK: &str = "docs/src/tests.md";
 
 #[derive(Args)]
@@ -51,7 +50,6 @@ pub(crate) struct Options {
     options: Vec<OsString>,
 }
 
-/// A part of the campaign.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     /// Every other part, the short ones first
@@ -89,7 +87,6 @@ impl Part {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// The seeds of a part that takes them.
     fn seeds(self, options: &Options) -> Option<RangeInclusive<u64>> {
         let usual = match self {
             Self::Press => 1..=100,
@@ -101,7 +98,6 @@ impl Part {
     }
 }
 
-/// Parses `A-B`, or one seed.
 fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
     let (from, to) = text.split_once('-').unwrap_or((text, text));
     match (from.parse(), to.parse()) {
@@ -110,7 +106,6 @@ fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
     }
 }
 
-/// Runs a part, or all of them.
 pub(crate) fn campaign(options: &Options) -> Result<()> {
     let parts = match options.part {
         Part::All => &Part::value_variants()[1..],
@@ -168,7 +163,6 @@ fn in_book(page: &str, part: &str, row: &str) -> Result<String> {
     Ok(lines.collect::<Vec<_>>().join("\n") + "\n")
 }
 
-/// Runs a part, and returns its result in a sentence.
 fn perform(part: Part, options: &Options) -> Result<String> {
     println!("== campaign {}", part.name());
     let seeds = part.seeds(options);
@@ -201,7 +195,6 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     }
 }
 
-/// The result of a run of the emulator.
 fn result(emulator: &mut Command) -> Result<String> {
     let mut lines = Vec::new();
     hear(emulator, |line| lines.push(line.to_owned()))?;
@@ -219,7 +212,6 @@ fn sentence(lines: &[String]) -> String {
     all.join(" ")
 }
 
-/// Runs the emulator with the rig's firmware.
 fn on_boards(run: &str, usual: &[&str], options: &Options) -> Result<String> {
     let usual = usual.iter().map(OsString::from);
     // what is given comes last, and counts

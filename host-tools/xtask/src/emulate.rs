@@ -17,9 +17,7 @@ Examples:
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options";
 
-/// The image that every run is of.
 pub(crate) const RIG: &str = "tactus-rig";
-/// The image that a hand holds.
 pub(crate) const HANDHELD: &str = "tactus-handheld";
 /// The image of a probe on somebody else's arm.
 pub(crate) const ARM: &str = "tactus-arm";
@@ -49,7 +47,6 @@ fn value(options: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Builds firmware and emulator, and returns the command of a run.
 pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
@@ -89,19 +86,16 @@ pub(crate) fn program(run: &str) -> Command {
     emulator
 }
 
-/// Where cargo puts the emulator.
 fn folder() -> PathBuf {
     target().join("emulator")
 }
 
-/// Builds the emulator.
 pub(crate) fn build() -> Command {
     let mut build = cargo_there("build");
     build.arg("--release");
     build
 }
 
-/// Lints of the emulator.
 pub(crate) fn lints() -> Command {
     let mut clippy = cargo_there("clippy");
     // in release, so that its build scripts and macros are those of the tests
@@ -109,14 +103,12 @@ pub(crate) fn lints() -> Command {
     clippy
 }
 
-/// The emulator's tests.
 pub(crate) fn tests() -> Command {
     let mut tests = cargo_there("test");
     tests.args(["--release", "--no-fail-fast"]);
     tests
 }
 
-/// Tests with the images that would be flashed.
 pub(crate) fn with_images<'t>(
     tests: &'t mut Command,
     elves: &[PathBuf],

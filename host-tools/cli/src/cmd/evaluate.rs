@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     if let Some(canvas) = canvas {
         let figures = figures(&courses, &names, args.stop.threshold)?;
-        canvas.write("tactus evaluate", &figures, out)?;
+        canvas.write(&figures, out)?;
     }
     Ok(())
 }

@@ -473,7 +473,7 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
     let folder = Folder::new();
     let mut journal = Journal::open(&folder.0.join("journal.jsonl")).unwrap();
     for step in STEPS.iter().take(from) {
-        let found = Finding::default().into();
+        let found = Finding::default();
         journal
             .add(Entry::new(step, NOW.to_owned(), &found))
             .unwrap();

@@ -42,15 +42,12 @@ pub enum Request {
     },
     /// The log of the session so far, as a file.
     Log,
-    /// Files that were [given](super::Remote::give), in this order: a session's log, recordings, or an MCAP file of
-    /// either. A session is heard as if the probe said it now.
-    #[cfg(feature = "open")]
+    /// Files that were [given](super::Remote::give), in this order: a session's log, or recordings. A session is heard as if the probe said it now.
     Open {
         /// What they are called, with the folders that they lie in.
         files: Vec<String>,
     },
     /// The samples of a slide of the recordings that were opened last: [`Frame::streams`].
-    #[cfg(feature = "open")]
     Recorded {
         /// Which of them, from 0.
         at: usize,

@@ -1,8 +1,7 @@
-//! Files that somebody gives: a session's log, recordings as a folder, or an MCAP file of either.
+//! Files that somebody gives: a session's log, or recordings as a folder.
 
 use std::collections::BTreeMap;
 
-use super::mcap::{self, FileError};
 use super::message::File;
 use super::recorded::{Opened, Recorded};
 use super::replay::replay;
@@ -20,16 +19,13 @@ pub enum OpenError {
     Empty(String),
     /// None of what can be shown.
     #[error(
-        "{0}: neither a session's log (.jsonl, `tactus device identify --log FILE`), nor an MCAP file (`tactus \
-             convert --mcap FILE`), nor recordings: of these give the folder with its manifest.csv, or a zip file of it"
+        "{0}: neither a session's log (.jsonl, `tactus device identify --log FILE`) nor recordings: of these give the \
+             folder with its manifest.csv, or a zip file of it"
     )]
     Other(String),
     /// See [`LogError`].
     #[error("{0}: {1}")]
     Log(String, LogError),
-    /// See [`FileError`].
-    #[error("{0}: {1}")]
-    Mcap(String, FileError),
     /// See [`RecordingError`].
     #[error(transparent)]
     Recordings(#[from] RecordingError),
@@ -40,14 +36,11 @@ pub enum OpenError {
 /// # Errors
 /// See [`OpenError`].
 pub(super) fn open(files: Vec<File>) -> Result<Opened, OpenError> {
-    if let [file] = &files[..] {
-        if file.bytes.starts_with(::mcap::MAGIC) || has_end(file, "mcap") {
-            let read = mcap::read(&file.bytes);
-            return read.map_err(|why| OpenError::Mcap(file.name.clone(), why));
-        } else if has_end(file, "jsonl") || has_end(file, "json") && !is_manifest(&file.name) {
-            let read = replay(&file.bytes).map(Opened::Session);
-            return read.map_err(|why| OpenError::Log(file.name.clone(), why));
-        }
+    if let [file] = &files[..]
+        && (has_end(file, "jsonl") || has_end(file, "json") && !is_manifest(&file.name))
+    {
+        let read = replay(&file.bytes).map(Opened::Session);
+        return read.map_err(|why| OpenError::Log(file.name.clone(), why));
     }
     let first = files.first().map(|file| file.name.clone());
     let first = first.ok_or_else(|| OpenError::Empty("what was given".to_owned()))?;

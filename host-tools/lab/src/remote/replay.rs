@@ -5,11 +5,9 @@ use tactus_core::wire::{Command, Event, Identify};
 
 use super::message::Frame;
 use super::verifying::{Verifying, config_of, words};
-#[cfg(feature = "open")]
 use crate::eval::show::count;
 use crate::eval::verified::{Slide, print_answer, print_slide};
 use crate::live::{Happening, ProbeMonitor};
-#[cfg(feature = "open")]
 use tactus_link::log;
 use tactus_link::log::{Line, TableParts};
 
@@ -17,7 +15,6 @@ use tactus_link::log::{Line, TableParts};
 ///
 /// # Errors
 /// It is no log, or of another version.
-#[cfg(feature = "open")]
 pub(super) fn replay(log: &[u8]) -> Result<Frame, log::LogError> {
     let mut heard = Replay::default();
     log::read(log, |line| heard.hear(line))?;
@@ -142,15 +139,6 @@ impl Replay {
         }
     }
 
-    /// It said why something failed.
-    #[cfg(feature = "open")]
-    pub(super) fn refused(&mut self, at_ms: u32, why: &str) {
-        self.frame.at_ms = at_ms;
-        self.monitor.happens(Happening::Refused {
-            why: why.to_owned(),
-        });
-    }
-
     /// The verification so far, and its last slide.
     fn verifying(&self) -> Option<(Verifying<'_>, Option<Slide>)> {
         let (asked, events) = self.verification.as_ref()?;
@@ -197,7 +185,6 @@ impl Replay {
     }
 
     /// All of it.
-    #[cfg(feature = "open")]
     pub(super) fn end(mut self) -> Frame {
         self.judged();
         self.take();

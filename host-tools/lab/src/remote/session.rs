@@ -12,9 +12,7 @@ use embassy_futures::yield_now;
 use tactus_core::wire::{Event, Live, Phase, Report};
 
 use super::message::{File, Frame, Question, Reply, Request, Work};
-#[cfg(feature = "open")]
 use super::open::open;
-#[cfg(feature = "open")]
 use super::recorded::{Opened, Recorded};
 use super::replay::Replay;
 use super::work::{Kept, work};
@@ -58,9 +56,7 @@ struct Open {
 #[derive(Default)]
 pub struct Remote {
     open: Option<Open>,
-    #[cfg(feature = "open")]
     given: Vec<Vec<u8>>,
-    #[cfg(feature = "open")]
     recorded: Option<Recorded>,
 }
 
@@ -68,7 +64,6 @@ type Answered = Result<Frame, Box<dyn std::error::Error>>;
 
 impl Remote {
     /// Takes the bytes of a file, which [`Request::Open`] names then.
-    #[cfg(feature = "open")]
     pub fn give(&mut self, bytes: Vec<u8>) {
         self.given.push(bytes);
     }
@@ -158,7 +153,6 @@ impl Remote {
                 });
                 Ok(frame)
             }
-            #[cfg(feature = "open")]
             Request::Open { files } => {
                 let given = std::mem::take(&mut self.given);
                 let files = files.into_iter().zip(given);
@@ -169,7 +163,6 @@ impl Remote {
                     Opened::Recordings(recorded) => self.recorded.insert(recorded).show(),
                 })
             }
-            #[cfg(feature = "open")]
             Request::Recorded { at } => {
                 let streams = self.recorded.as_ref().and_then(|all| all.streams(at));
                 Ok(Frame {
