@@ -1,7 +1,7 @@
 //! Logs of sessions, which `tactus device --log` writes: a line of JSON for every command and every report.
 //!
 //! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":1,"port":"/dev/ttyACM0"}}`. Each other is
-//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log:
 //! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;

@@ -245,8 +245,8 @@ impl<'t> Presented<'t> {
     }
 }
 
-/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text, shows
-/// every step.
+/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text,
+/// shows every step.
 fn explore_and_show<R>(
     rig: &mut R,
     presented: &mut Presented<'_>,

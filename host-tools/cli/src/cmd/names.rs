@@ -32,7 +32,8 @@ pub(crate) fn find<'n>(wanted: &str, known: &[&'n str]) -> Result<&'n str, Strin
         .ok_or_else(|| unknown(wanted, known.iter().copied()))
 }
 
-/// The name that differs least, if it differs by a slip: a third of its letters at most, or by words that were left out.
+/// The name that differs least, if it differs by a slip: a third of its letters at most, or by words that were left
+/// out.
 pub(crate) fn nearest<'n>(wanted: &str, known: &[&'n str]) -> Option<&'n str> {
     let wanted = wanted.to_lowercase();
     let slips = known

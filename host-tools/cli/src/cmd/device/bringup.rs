@@ -26,8 +26,8 @@ Examples:
   tactus device bringup                    goes on where it stopped last time
   tactus device bringup --report rig2      another rig
 
-Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each step that is over is
-kept in DIR/journal.jsonl; DIR/report.txt and report.json are to be sent to somebody who helps.
+Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each
+step that is over is kept in DIR/journal.jsonl; DIR/report.txt and report.json are to be sent to somebody who helps.
 Ctrl-C stops whatever moves; the exit code is 130 then. It is 1 while a step has not passed.")]
 pub(crate) struct Args {
     /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
@@ -92,7 +92,8 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             );
         }
         Ended::Flash(_) => eprintln!(
-            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does the last steps"
+            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does \
+             the last steps"
         ),
         Ended::Failed => bail!("a step has not passed; the same command runs it again"),
     }

@@ -26,8 +26,8 @@ Examples:
   tactus device doctor --port /dev/ttyACM1
   tactus device doctor --format json > doctor.json    to send to somebody
 
-Nothing moves. The probe writes one of its settings again,
-as it is, to show that its store works. Exit code: 0 if nothing is wrong, 1 otherwise; what is only worth a look leaves 0.")]
+Nothing moves. The probe writes one of its settings again, as it is, to show that its store works. Exit code: 0 if
+nothing is wrong, 1 otherwise; what is only worth a look leaves 0.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,

@@ -157,7 +157,8 @@ fn print_lives(
         let [right, worst, unsure, wrong] = shares.map(|share| share * 100.0);
         writeln!(
             out,
-            "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, wrong updates {wrong:.2} %",
+            "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, \
+             wrong updates {wrong:.2} %",
             life.worst.1
         )?;
         writeln!(out, "    the user is told: {}", in_words(&life.verdicts))?;

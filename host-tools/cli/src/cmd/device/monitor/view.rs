@@ -1,5 +1,5 @@
-//! What the monitor looks like. Colours are the ones that colour-blind people tell apart (blue, orange, vermillion), and say
-//! nothing that is not also said in words.
+//! What the monitor looks like. Colours are the ones that colour-blind people tell apart (blue, orange, vermillion),
+//! and say nothing that is not also said in words.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
