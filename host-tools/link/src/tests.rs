@@ -655,7 +655,7 @@ proptest! {
         garbage in proptest::collection::vec(any::<u8>(), 0..300),
     ) {
         let mut probe = Probe::default();
-        let part = |n| Event::TablePart {
+        let part = |n: u32| Event::TablePart {
             offset: n * 256,
             length: 15_360,
             bytes: (0..PART).map(|b| b as u8).collect(),
