@@ -118,13 +118,7 @@ impl Table {
             let texture = texture.clone();
             let row: Vec<_> = movements.iter().map(|&m| of(slides, m)).collect();
             if let Some((few, &movement)) = row.iter().zip(&movements).find(|(s, _)| s.len() < 2) {
-                let there = few.len();
-                return Err(FirstError::Few {
-                    texture,
-                    movement,
-                    there,
-                }
-                .raise());
+                return Err(FirstError::few(&texture, movement, few.len()).raise());
             }
             observed.push(row);
         }

@@ -68,7 +68,7 @@ const PRODUCTS: [Product; 3] = [
             Some(BROWSER.triple),
         ),
         lacks: || toolchain::get(BROWSER).map(drop),
-        build: || Ok(("tactus-page.html".to_owned(), page::build()?.page)),
+        build: || Ok(("tactus-page.html".to_owned(), page::build("release")?.page)),
     },
 ];
 /// The images, as [`Product::made_of`].

@@ -6,7 +6,6 @@
 
 mod flash;
 mod folder;
-mod played;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use embassy_futures::block_on;
@@ -23,7 +22,6 @@ use tactus_lab::eval::learn::know_lengths;
 
 pub use flash::{Flash, images};
 pub use folder::recordings;
-pub use played::{another_scenario, scenario};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// More textures than any table for the probe has.
@@ -273,7 +271,7 @@ fn used(store: &mut Store<Flash>, [what, how]: [u8; 2], buffer: &mut [u8]) {
             let _ = block_on(async {
                 store.begin_table(bytes.len()).await?;
                 store.write_table(0, bytes).await?;
-                store.commit_table(buffer).await.map(|_| ())
+                store.commit_table(None, buffer).await.map(|_| ())
             });
         }
         3 => {
@@ -368,7 +366,6 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             .map(|image| vec![image, 1, 0, 9, 4, 0, 3, 2, 1, 3, 7, 1, 0, 6, 0, 4, 0])
             .collect(),
         "recordings" => folder::seeds(),
-        "scenario" => played::seeds(),
         other => panic!("no target {other}"),
     }
 }

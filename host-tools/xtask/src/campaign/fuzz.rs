@@ -10,7 +10,7 @@ use clap::Parser;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain;
 
-const TARGETS: [&str; 5] = ["wire", "table", "store", "recordings", "scenario"];
+const TARGETS: [&str; 4] = ["wire", "table", "store", "recordings"];
 const MAX_LEN: usize = 8192;
 
 /// Attacks the parsers.
