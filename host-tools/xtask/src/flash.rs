@@ -55,7 +55,6 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
 }
 
 impl Options {
-    /// Returns true for an image that reports.
     fn is_watched(&self) -> bool {
         self.self_test || self.test
     }

@@ -146,7 +146,7 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     }
     if let Some(canvas) = canvas {
         let figures = exploration.figures(args.stop.threshold)?;
-        canvas.write("tactus device identify", &figures, out)?;
+        canvas.write(&figures, out)?;
     }
     Ok(match answered.map(|(verdict, _)| verdict.told()) {
         Some(Told::Sure) => Done::Fully,
