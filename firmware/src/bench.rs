@@ -74,7 +74,6 @@ impl Counter for Cycles {
     }
 }
 
-/// What [`BENCH_WANTED`] says where the bench is wanted.
 const WANTED: u32 = 0x7ac7_be7c;
 
 /// Whether the host wants the bench: it writes so before the chip starts, and the start-up code leaves it alone. After power-up any
@@ -83,7 +82,6 @@ const WANTED: u32 = 0x7ac7_be7c;
 #[unsafe(link_section = ".uninit.BENCH_WANTED")]
 static BENCH_WANTED: AtomicU32 = AtomicU32::new(0);
 
-/// Whether the host wants the bench; once.
 fn is_wanted() -> bool {
     BENCH_WANTED.swap(0, Relaxed) == WANTED
 }

@@ -107,7 +107,6 @@ assign_resources! {
         buzzer: PC9,
         tones: TIM8,
     }
-    /// The handheld's sensor of motion, if it has one.
     motion: Motion {
         spi: SPI4,
         sck: PE2,
@@ -124,7 +123,6 @@ assign_resources! {
 /// nothing else works any more.
 pub(crate) type Named<P> = <P as Named_>::Peripheral;
 
-/// See [`Named`].
 pub(crate) trait Named_ {
     type Peripheral;
 }
@@ -228,7 +226,6 @@ fn find_clock() -> bool {
     found
 }
 
-/// Whether the chip runs by the debug probe's 8 MHz.
 pub(crate) fn has_clock() -> bool {
     RCC.pllcfgr().read().pllsrc() == Pllsrc::HSE
 }

@@ -46,7 +46,7 @@ pub fn handheld() -> ! {
         rescue::refuse("the link's rate cannot be had");
     };
     hands.spawn(only(link::send(tx)));
-    hands.spawn(only(link::receive(rx, &hand::BODY)));
+    hands.spawn(only(link::receive(rx, hand::BODY)));
     hands.spawn(only(hand::hand(
         r.store,
         r.handle,

@@ -22,8 +22,7 @@ pub mod weights;
 
 pub use draw::draw;
 pub use judge::{
-    ASK_AFTER, FEATURES, JudgeError, Judgement, LEADING, MAX_SLIDES, MOVEMENT, free_name, judge,
-    judge_at_most,
+    ASK_AFTER, FEATURES, JudgeError, Judgement, MAX_SLIDES, MOVEMENT, judge, judge_at_most,
 };
 pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};

@@ -57,7 +57,9 @@ impl Host for Heard {
 }
 
 fn ask(probe: &mut SimProbe<'_, Heard>, command: Command) -> Result<(), Box<Failure>> {
-    block_on(probe.perform(&command)).map_err(Box::new)
+    block_on(probe.perform(&command))
+        .map(drop)
+        .map_err(Box::new)
 }
 
 fn train() -> Command {

@@ -1,7 +1,6 @@
 //! Tests of core and lab across the crates: golden values, reference figures, faults, explorations.
 
 mod arm;
-mod confusions;
 mod crush;
 mod early;
 mod fabricslide;

@@ -310,7 +310,7 @@ fn reliability_is_what_is_counted_slide_by_slide() {
         let presented = run.unknown;
         let table = run.learn(config.method).unwrap();
         let mut explorer = explorer(&table, experiment.measured(), config, None).unwrap();
-        play_with(&mut explorer, None, config.strategy, run, |_, explorer| {
+        play_with(&mut explorer, config.strategy, run, |_, explorer| {
             let posterior = explorer.posterior();
             let best = posterior.iter().copied().fold(0.0, f32::max);
             let range = match best {

@@ -14,7 +14,6 @@ use tactus_core::table::{Action, Table};
 
 /// Forces in a block: one each tick of the servo's.
 const SHEARS: usize = BLOCK * 1000 / RATE_HZ as usize;
-/// Textures at most: the firmware's own.
 const CAPACITY: usize = tactus_core::table::MAX_TEXTURES;
 /// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
 pub const MOST_TEXTURES: usize = 1500;
@@ -284,7 +283,6 @@ fn slide_of<'p>(plan: &'p Plan, samples: &[i16]) -> (Slide<'p>, Block) {
     (slide, block)
 }
 
-/// Makes it the next block, with the tangential force of each ms.
 fn fill(block: &mut Block, samples: &[i16]) {
     block.number += 1;
     block.pac.clear();

@@ -10,9 +10,7 @@ use tactus_core::dsp::{
 
 use super::transform_kernel;
 
-/// Outputs of the band-pass that are computed at once.
 const AT_ONCE: usize = 12;
-/// How many times that at most from one buffer.
 const MOST: usize = 22;
 /// Words of even samples, of sums and of odd ones that these take: the last ones are read, and do not count.
 const WORDS: usize = (TAPS - 1 + MOST * AT_ONCE) / 4 + 4;
@@ -410,7 +408,6 @@ unsafe fn add_power_eights(bins: *const Complex32, sums: *mut f32, many: usize) 
     }
 }
 
-/// Those for a Cortex-M4F.
 pub(crate) const KERNELS: Kernels = Kernels {
     clip,
     band_energy,

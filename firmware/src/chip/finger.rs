@@ -41,12 +41,10 @@ pub(crate) fn name() -> FingerName {
     known().unwrap_or_default()
 }
 
-/// The same as messages and tables have it.
 pub(crate) fn code() -> FingerCode {
     FingerCode::of(name())
 }
 
-/// What it is on its bus.
 pub(crate) fn parts() -> &'static FingerParts {
     name().parts()
 }
@@ -88,7 +86,6 @@ pub(crate) fn find_again(bus: &mut Bus) -> bool {
     }
 }
 
-/// Which finger answers now: some ms.
 fn look(bus: &mut Bus) -> Option<FingerName> {
     find(|finger, transaction, wait_us| {
         let port = finger.parts().ports.get(usize::from(transaction.port));
@@ -101,15 +98,11 @@ fn look(bus: &mut Bus) -> Option<FingerName> {
     })
 }
 
-/// Waits for so many whole us, and the part of one that has passed.
 fn wait(us: u32) {
     block_for(Duration::from_micros((us + 1).into()));
 }
 
 /// Does the finger's start-up list, and waits for it: 25 ms of a `mems`.
-///
-/// # Errors
-/// A part does not answer as it must.
 pub(crate) fn start(bus: &mut Bus) -> Result<(), Unexpected> {
     let parts = parts();
     for step in parts.start {

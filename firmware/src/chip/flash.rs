@@ -26,7 +26,6 @@ const LOOK: Duration = Duration::from_millis(100);
 #[unsafe(link_section = ".ccm.BUFFER")]
 static mut BUFFER: MaybeUninit<[u8; MAX_TABLE]> = MaybeUninit::uninit();
 
-/// The buffer for a table, once.
 pub(crate) fn buffer() -> &'static mut [u8] {
     static ONCE: ConstStaticCell<()> = ConstStaticCell::new(());
     ONCE.take();
@@ -38,10 +37,6 @@ pub(crate) fn buffer() -> &'static mut [u8] {
     }
 }
 
-/// The store.
-///
-/// # Errors
-/// It cannot be opened.
 pub(crate) async fn open(flash: board::Storage) -> Result<Storage, StoreError> {
     Store::open(Bank2::new(flash)).await
 }
@@ -68,7 +63,6 @@ pub(crate) async fn wait(
     Err(StoreError::Silent)
 }
 
-/// The stored table, where it lies.
 pub(crate) struct MappedTable;
 
 impl StoredBytes<Bank2> for MappedTable {

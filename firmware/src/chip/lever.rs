@@ -17,7 +17,6 @@ use tactus_core::rig::steps::{BASE_HZ, Steps};
 use crate::board::{Named, held};
 use crate::{board, chip};
 
-/// The timer counts at 2 MHz.
 const PRESCALER: u16 = 83;
 const PERIOD: u16 = (2_000_000 / BASE_HZ) as u16;
 static CORE_HZ: AtomicU32 = AtomicU32::new(168_000_000);
@@ -31,7 +30,6 @@ static RATE: AtomicI32 = AtomicI32::new(0);
 static MADE: AtomicI32 = AtomicI32::new(0);
 static STEPS: Mutex<CriticalSectionRawMutex, Cell<Steps>> = Mutex::new(Cell::new(Steps::new()));
 
-/// The lever's driver.
 pub(crate) struct Lever {
     enable: Output<'static>,
     enabled: Instant,
@@ -41,7 +39,6 @@ pub(crate) struct Lever {
 }
 
 impl Lever {
-    /// Takes the pins: no current, no steps.
     pub(crate) fn new(pins: board::Lever) -> Self {
         let step = PwmPin::new(pins.step, OutputType::PushPull);
         rcc::enable_and_reset::<TIM1>();
@@ -69,7 +66,6 @@ impl Lever {
         }
     }
 
-    /// Steps made so far, downwards positive.
     pub(crate) fn steps(&self) -> i32 {
         MADE.load(Relaxed)
     }

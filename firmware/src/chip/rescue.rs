@@ -16,9 +16,7 @@ use super::{lever, watchdog};
 use crate::board::{self, Named, held};
 
 const MAGIC: u32 = 0x7ac7_1a57;
-/// Bytes of the last words.
 const WORDS: usize = 120;
-/// Callers that the last words can hold.
 const CALLERS: usize = 10;
 
 /// Last words that survive a reset; RAM that the start-up code leaves alone. Every bit pattern is a value.

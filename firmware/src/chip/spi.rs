@@ -7,7 +7,6 @@ pub(super) fn send(spi: Spi, frame: u16) {
     spi.dr().write(|w| w.set_dr(frame));
 }
 
-/// The frame that is over.
 #[inline(always)]
 pub(super) fn received(spi: Spi) -> u16 {
     spi.dr().read().dr()

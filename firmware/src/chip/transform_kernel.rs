@@ -266,7 +266,6 @@ fn recombine(angles: &Angles, values: &mut [Complex32; FRAME / 16]) {
     }
 }
 
-/// [`Kernels::transform`](tactus_core::dsp::Kernels::transform).
 pub(super) fn transform(angles: &Angles, values: &mut [Complex32]) {
     let many = values.len();
     let places: &[[u8; 2]] = match many {
@@ -287,7 +286,6 @@ pub(super) fn transform(angles: &Angles, values: &mut [Complex32]) {
     };
 }
 
-/// [`Kernels::transform_reals`](tactus_core::dsp::Kernels::transform_reals).
 pub(super) fn transform_reals<'r>(
     angles: &Angles,
     reals: &'r mut Reals,

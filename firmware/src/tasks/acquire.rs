@@ -9,7 +9,6 @@ use crate::board;
 use crate::chip::finger;
 use crate::chip::slots::{self, Bus, Word};
 
-/// What is said while no finger answers.
 const NOBODY: &str = "no finger answers: check its power, its cable and its chip select";
 /// From one attempt to the next, ms; and attempts from one word about it to the next.
 const AGAIN_MS: u64 = 500;

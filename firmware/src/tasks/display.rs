@@ -72,15 +72,12 @@ const AREA: [u8; 7] = [
 
 type Bus = I2c<'static, Async, Master>;
 
-/// The picture that was sent last, as it goes over the bus.
 struct Sent {
     bytes: [u8; 1 + WIDTH * HEIGHT / 8],
-    /// Whether there is one.
     any: bool,
 }
 
 impl Sent {
-    /// Takes a picture, and says whether it differs.
     fn take(&mut self, picture: &Picture) -> bool {
         let [_, points @ ..] = &mut self.bytes;
         let differs = !self.any || points != picture.bytes();

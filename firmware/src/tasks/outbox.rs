@@ -14,10 +14,8 @@ const OUT: usize = 6144;
 pub(crate) static OUTBOX: Pipe<OneLevel, OUT> = Pipe::new();
 static NUMBER: AtomicU16 = AtomicU16::new(0);
 pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
-/// Raw samples are wanted.
 pub(crate) static STREAM: AtomicBool = AtomicBool::new(false);
 
-/// Says that the probe has booted, and with which finger.
 pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
     tell(Event::Booted {
         protocol: PROTOCOL,

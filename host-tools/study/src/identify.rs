@@ -333,7 +333,6 @@ fn evolution(
     ]];
     let outcome = play_with(
         explorer,
-        None,
         Method::Paper.strategy(),
         run,
         |action, explorer| {

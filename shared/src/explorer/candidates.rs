@@ -10,9 +10,6 @@ use crate::up_to;
 
 impl<'t, const N: usize> Explorer<'t, N> {
     /// An explorer for all textures of the table, for a rig that measures `measured`.
-    ///
-    /// # Errors
-    /// See [`ExplorerError`].
     pub fn new(
         table: Table<'t>,
         measured: PropertySet,
@@ -23,9 +20,6 @@ impl<'t, const N: usize> Explorer<'t, N> {
 
     /// An explorer that only considers `candidates` (Methods, "Texture Discrimination": a pair, all others at
     /// probability 0).
-    ///
-    /// # Errors
-    /// See [`ExplorerError`].
     pub fn among(
         table: Table<'t>,
         measured: PropertySet,
@@ -38,9 +32,6 @@ impl<'t, const N: usize> Explorer<'t, N> {
     }
 
     /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold twice.
-    ///
-    /// # Errors
-    /// See [`ExplorerError`]; it is of no use then.
     pub(crate) fn consider(
         &mut self,
         measured: PropertySet,

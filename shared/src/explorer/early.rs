@@ -22,7 +22,7 @@ pub struct Look {
 
 impl Look {
     /// Whether the slide may end: see [`most_doubt`].
-    pub fn is_enough(&self, most_doubt: f32) -> bool {
+    pub(crate) fn is_enough(&self, most_doubt: f32) -> bool {
         self.known && self.doubt <= most_doubt
     }
 }
@@ -42,9 +42,6 @@ impl<const N: usize> Explorer<'_, N> {
     /// What the exploration would say if the slide of an action ended now, at the `n`th length of the table, from 1. The
     /// exploration stands as it was. `None`: the table does not know how slides of that length are for every candidate, or the
     /// method cannot tell.
-    ///
-    /// # Errors
-    /// See [`ObserveError`].
     pub fn look(
         &mut self,
         action: Action,
@@ -68,9 +65,6 @@ impl<const N: usize> Explorer<'_, N> {
     }
 
     /// Takes in a slide of an action that ended at the `n`th length. Whether it did: otherwise the table does not know that length.
-    ///
-    /// # Errors
-    /// See [`ObserveError`]; nothing has changed then.
     pub fn observe_early(
         &mut self,
         action: Action,

@@ -6,7 +6,6 @@ use crate::features::{MAX_FEATURES, Vector};
 use crate::table::MAX_MOVEMENTS;
 use crate::up_to;
 
-/// The slides of one movement in an episode.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MovementSums {
     pub(super) movement: u8,
@@ -16,11 +15,9 @@ pub(super) struct MovementSums {
     /// Sum of ln(speed) of the slides of which it is known, 1/1024, and how many these are.
     pub(super) pace: i32,
     pub(super) paces: u8,
-    /// Sum of the properties.
     pub(super) properties: [f32; 3],
 }
 
-/// All movements of an episode.
 pub(super) type Episode = Vec<MovementSums, MAX_MOVEMENTS>;
 
 /// The slides of `movement`, one more than before; `None` beyond 255, where nothing new is learned.

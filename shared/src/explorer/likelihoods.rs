@@ -21,9 +21,6 @@ const MOST_OFF: i32 = (1 << 26) - 1;
 impl<const N: usize> Explorer<'_, N> {
     /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The
     /// rest of the slide is not used.
-    ///
-    /// # Errors
-    /// See [`ObserveError`]; nothing has changed then.
     pub fn observe(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
         let made = self
             .actions
@@ -36,7 +33,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// Compares a slide with every candidate.
     pub(super) fn compare(
         &mut self,
         action: Action,
@@ -49,7 +45,6 @@ impl<const N: usize> Explorer<'_, N> {
         }
     }
 
-    /// Counts one slide more, of the action at this place.
     pub(super) fn count(&mut self, made: usize, action: Action) {
         if let Some(made) = self.made.get_mut(made) {
             *made = made.saturating_add(1);
@@ -69,7 +64,6 @@ impl<const N: usize> Explorer<'_, N> {
             .ok_or(ObserveError::Missing(property))
     }
 
-    /// One property: its likelihood is added to what was there.
     fn observe_property(
         &mut self,
         action: Action,
@@ -148,7 +142,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// All features, whitened.
     fn observe_features(
         &mut self,
         action: Action,
@@ -206,7 +199,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// What a property of a texture is expected to be in one slide.
     pub(super) fn expected(
         &self,
         texture: u16,

@@ -4,7 +4,6 @@ use super::spread::DEGREES_OF_FREEDOM;
 use crate::features::{MAX_FEATURES, Vector};
 use crate::table::{Contents, Table, oas, white};
 
-/// Fewest textures whose means say what textures are like.
 const POPULATION: usize = 3;
 /// Variance of textures' means where there are too few to say, standard deviations within a texture squared.
 const WIDE: f32 = 400.0;
@@ -31,14 +30,11 @@ pub(super) struct NoveltyModel {
     mean: [f32; MAX_FEATURES],
     variance: [f32; MAX_FEATURES],
     pub(super) source: Source,
-    /// A squared distance from all textures that is greater counts as this one.
     farthest: f32,
-    /// See [`student_norm`].
     norm: f32,
 }
 
 impl NoveltyModel {
-    /// Whether the table says it, and has limits.
     pub(super) fn is_calibrated(&self) -> bool {
         self.source == Source::Table
     }

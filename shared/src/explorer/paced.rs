@@ -117,7 +117,6 @@ pub(super) fn add_likelihoods(
     Some((elsewhere, can_tell))
 }
 
-/// The first numbers of these bytes; 0 beyond the features.
 fn numbers(bytes: &[u8], features: usize) -> White {
     let mut numbers = White::default();
     for (to, from) in numbers.iter_mut().zip(bytes.as_chunks().0).take(features) {

@@ -1,6 +1,5 @@
 //! The explorer against the paper's equations, written out in f64.
 
-mod confusions;
 mod drift;
 mod early;
 mod fused;

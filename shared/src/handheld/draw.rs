@@ -19,14 +19,12 @@ use super::guidance::{Again, Way, ZONE_MN};
 use super::screen::{About, Entry, Row, Screen, Trouble, first_line};
 use super::spelling::{Place, WHEEL};
 
-/// The bar's end, mN.
 const BAR_MN: f32 = 1200.0;
 /// A slide is too fast or too slow when it is off by this part of its way.
 const AHEAD: f32 = 0.15;
 const WIDTH: i32 = super::picture::WIDTH as i32;
 const MIDDLE: i32 = WIDTH / 2;
 
-/// The brush: errors are the display's.
 struct Brush<'d, D>(&'d mut D);
 
 type Done<D> = Result<(), <D as DrawTarget>::Error>;
@@ -127,14 +125,12 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// Draws the page's title.
     fn title(&mut self, title: &str, right: &str) -> Done<D> {
         self.fill(0, 0, WIDTH, 12, false)?;
         self.write(title, 3, 1, &SMALL, Anchor::Left, true)?;
         self.write(right, WIDTH - 3, 1, &SMALL, Anchor::Right, true)
     }
 
-    /// Draws the button's actions: pressed, and held.
     fn button(&mut self, press: &str, hold: &str) -> Done<D> {
         if !press.is_empty() {
             self.disc(4, 59, 2, false)?;
@@ -150,7 +146,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// Draws the force and its zone.
     fn force(&mut self, force_mn: f32, y: i32) -> Done<D> {
         const INSIDE: i32 = WIDTH - 4;
         let x = |mn: f32| 2 + (INSIDE as f32 * (mn / BAR_MN).clamp(0.0, 1.0)) as i32;
@@ -165,7 +160,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.fill(low, y - 4, high - low, 1, false)
     }
 
-    /// The three leading textures.
     fn rows(&mut self, rows: &[Row<'_>], y: i32) -> Done<D> {
         for (row, y) in rows.iter().zip((y..).step_by(11)) {
             self.left(&cut(row.name, 11), 0, y)?;
@@ -205,18 +199,15 @@ fn count(slide: u8, of: u8) -> String<40> {
     }
 }
 
-/// The leading texture, if it is worth a line.
 fn perhaps(rows: &[Row<'_>]) -> String<40> {
     let name = rows.first().map_or("?", |row| row.name);
     say(format_args!("{}?", cut(name, 20)))
 }
 
-/// A name in a line of its own.
 fn below(name: &str) -> String<40> {
     say(format_args!(" {}", cut(name, 20)))
 }
 
-/// Writes a short text.
 fn say(text: core::fmt::Arguments<'_>) -> String<40> {
     let mut said = String::new();
     // cut off if it is too long
@@ -225,9 +216,6 @@ fn say(text: core::fmt::Arguments<'_>) -> String<40> {
 }
 
 /// Draws a screen onto a dark display.
-///
-/// # Errors
-/// The display's.
 pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &mut D) -> Done<D> {
     let brush = &mut Brush(display);
     match screen {
@@ -378,7 +366,6 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
     }
 }
 
-/// The screens that take more than a few lines.
 impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     fn ready(&mut self, textures: u16) -> Done<D> {
         let ending = if textures == 1 { "" } else { "s" };
@@ -523,13 +510,11 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.button("go on", "")
     }
 
-    /// A name and its value.
     fn row(&mut self, name: &str, value: &str, y: i32) -> Done<D> {
         self.left(name, 1, y)?;
         self.right(value, y)
     }
 
-    /// Three lines below a headline.
     fn lines(&mut self, lines: [&str; 3]) -> Done<D> {
         for (line, y) in lines.iter().zip((19..).step_by(11)) {
             self.left(line, 1, y)?;

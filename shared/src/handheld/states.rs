@@ -11,12 +11,13 @@ use self::lists::{Entries, List};
 
 use super::button::Button;
 use super::guidance::{Again, Event};
-use super::judge::{ASK_AFTER, JudgeError, Judgement, LEADING, MAX_SLIDES, trials};
+use super::judge::{ASK_AFTER, JudgeError, Judgement, MAX_SLIDES, trials};
 use super::screen::{About, Row, Screen, Trouble};
 use super::speed::Moved;
 use super::spelling::Spelling;
 use super::touch::Touch;
 use crate::dsp::Plan;
+use crate::explorer::LEADING;
 use crate::features::Observation;
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
@@ -79,7 +80,6 @@ pub enum Answer {
     Trouble,
 }
 
-/// A page of the display.
 #[derive(Clone, PartialEq, Debug)]
 enum Page {
     /// Nothing begun.
@@ -126,24 +126,18 @@ pub struct Handheld<'p> {
     shown: u32,
     idle: u32,
     silent: u32,
-    /// The slides of this episode that were good.
     episode: Vec<Observation, MAX_SLIDES>,
-    /// Their last judgement.
     judgement: Option<Judgement>,
     /// The slides are for learning, not for identifying.
     training: bool,
-    /// The only texture to compare them with, if the person chose one.
     reference: Option<u16>,
     /// The go / no-go output is to be set.
     go: Option<bool>,
-    /// Textures of the table.
     textures: u16,
-    /// Its finger feels gravity.
     pub(super) turns: bool,
     job: Option<Job>,
     melody: &'static [Note],
     note: u8,
-    /// The page was changed and not drawn since.
     fresh: bool,
     /// The host's slide, and the result of its request.
     asked: Option<Asked>,
@@ -205,7 +199,6 @@ impl<'p> Handheld<'p> {
         self.touch.lose(words);
     }
 
-    /// Ends the host's request.
     fn end(&mut self, answer: Answer) {
         self.answer = Some(answer);
         self.asked = None;
@@ -264,7 +257,6 @@ impl<'p> Handheld<'p> {
         self.show(Page::Verdict);
     }
 
-    /// Compares the next slides with this texture.
     fn compare(&mut self, reference: u16) {
         self.clear_episode();
         self.reference = Some(reference);
@@ -344,7 +336,7 @@ impl<'p> Handheld<'p> {
     }
 
     /// Returns true if the display names textures, so that [`Handheld::screen`] needs the table.
-    pub fn names_textures(&self) -> bool {
+    pub(crate) fn names_textures(&self) -> bool {
         matches!(self.page, Page::Verdict | Page::Choose(..))
     }
 
@@ -472,7 +464,6 @@ impl<'p> Handheld<'p> {
         self.training = false;
     }
 
-    /// A new episode may begin.
     fn begin(&mut self) {
         self.clear_episode();
         self.reference = None;

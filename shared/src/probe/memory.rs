@@ -11,8 +11,7 @@ use crate::store::{Store, StoreError};
 use crate::table::{Table, TableError};
 use crate::wire::{Event, Failure, MemoryError};
 
-/// What learning needs: the store, the table that it begins with, and the buffer for a new one.
-type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
+pub(super) type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
 
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
@@ -24,7 +23,6 @@ pub struct Memory<'m, F, B> {
     /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
     /// table is made here too; afterwards [`Memory::reload`] is due.
     buffer: &'m mut [u8],
-    /// Bytes of the table in force, or why there is none.
     length: Result<usize, MemoryError>,
     /// No texture was learned and no table was written.
     is_factory: bool,
@@ -131,9 +129,6 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     }
 
     /// The table in force.
-    ///
-    /// # Errors
-    /// There is none.
     pub fn table(&self) -> Result<Table<'_>, MemoryError> {
         match &self.length {
             Ok(_) => Ok(Table::read(self.in_force())?),
@@ -147,9 +142,6 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     }
 
     /// The store.
-    ///
-    /// # Errors
-    /// It could not be opened.
     pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError> {
         self.store.as_mut().map_err(|why| MemoryError::Broken(*why))
     }
@@ -166,7 +158,6 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         Ok((store, base, self.buffer))
     }
 
-    /// Commits the table that was written to the store.
     pub(super) async fn commit(&mut self) -> Result<(), MemoryError> {
         let store = self
             .store

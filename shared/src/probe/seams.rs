@@ -33,21 +33,12 @@ pub trait RigHandle: Rig<Error = RigError> {
     async fn begin(&mut self, seed: u32);
 
     /// Ends a fault if there is one, then finds the limit switches, the lever's first.
-    ///
-    /// # Errors
-    /// The rig is not homed.
     async fn home(&mut self) -> Result<(), RigError>;
 
     /// Moves the stage without load from one end to the other, at this speed in um/s.
-    ///
-    /// # Errors
-    /// The run was refused, failed, or was stopped.
     async fn run_unloaded(&mut self, speed_um_s: u32) -> Result<UnloadedRun, RigError>;
 
     /// Uses this calibration from now on.
-    ///
-    /// # Errors
-    /// The rig refuses it.
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
     /// Allows movements of up to 2 N, or forbids them. What the store cannot keep is not allowed.
@@ -77,9 +68,6 @@ pub trait RigHandle: Rig<Error = RigError> {
 
     /// Measures P_DC under a weight of so many mN that a person puts on the lifted finger, in counts above that in the air; below
     /// 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
-    ///
-    /// # Errors
-    /// No such weight was put on the finger.
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure>;
 
     /// Measures gravity along the finger, which a person turns over.

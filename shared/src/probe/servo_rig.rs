@@ -56,9 +56,6 @@ pub enum RigCommand {
 
 impl RigCommand {
     /// Has the control do it.
-    ///
-    /// # Errors
-    /// The control refuses it.
     pub fn apply(self, control: &mut Control) -> Result<(), Refused> {
         match self {
             Self::Home => {
@@ -93,9 +90,6 @@ impl RigCommand {
 
 impl RigCommand {
     /// Has a rig do it that an arm moves.
-    ///
-    /// # Errors
-    /// The rig refuses it.
     pub fn apply_over_link(self, rig: &mut RigOverLink) -> Result<(), Refused> {
         match self {
             Self::Home | Self::Recover => {
@@ -164,7 +158,9 @@ impl Samples {
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Servo {
     /// Whether it has a stage of ours, whose motor's current is the shear; otherwise an arm moves the finger.
-    const HAS_STAGE: bool = true;
+    fn has_stage(&self) -> bool {
+        true
+    }
 
     /// Gives a command and waits for the answer. Samples from before the command are dropped.
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
@@ -220,7 +216,6 @@ impl Asked {
         }
     }
 
-    /// Looks at the finger; whether it is over.
     fn look(&mut self, rig: &RigState, gravity: Option<f32>) -> bool {
         let counts = rig.force_mn / rig.calibration.pressure.force_mn_per_count;
         match self {
@@ -252,7 +247,6 @@ impl<S: Servo> ServoRig<S> {
         }
     }
 
-    /// Waits until the rig is at rest.
     async fn rest(&mut self) -> Result<RigState, RigError> {
         self.until(|rig| rig.at_rest, |_| ()).await
     }
@@ -282,9 +276,6 @@ impl<S: Servo> ServoRig<S> {
     }
 
     /// Lifts the finger to its limit switch; the stage stays where it is.
-    ///
-    /// # Errors
-    /// See [`RigError`].
     pub async fn lift(&mut self) -> Result<(), RigError> {
         self.command(RigCommand::Lift).await?;
         self.rest().await.map(|_| ())
@@ -374,7 +365,7 @@ impl<S: Servo> RigHandle for ServoRig<S> {
     }
 
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
-        if S::HAS_STAGE {
+        if self.servo.has_stage() {
             calibrate::by_motor(self).await
         } else {
             calibrate::in_air(self).await
@@ -438,7 +429,7 @@ impl<S: Servo> Rig for ServoRig<S> {
     type Error = RigError;
 
     fn measures(&self) -> PropertySet {
-        if S::HAS_STAGE {
+        if self.servo.has_stage() {
             PropertySet::ALL
         } else {
             PropertySet::WITHOUT_SHEAR

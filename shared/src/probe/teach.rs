@@ -63,7 +63,7 @@ pub async fn put_in_force<F: NorFlash>(
 ///
 /// # Errors
 /// The store failed; the table in force is as it was.
-pub async fn learn_by_itself<F: NorFlash>(
+pub(crate) async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
     store: &mut Store<F>,
     buffer: &mut [u8],
@@ -145,7 +145,6 @@ fn place(
     record.movements.get_mut(at)
 }
 
-/// Takes in so many slides of this mean.
 fn adapt(known: &mut Whitened, slides: u8, mean: &Vector) {
     for _ in 0..slides {
         known.adapt(mean);
@@ -243,7 +242,6 @@ pub(crate) async fn delete_stale<F: NorFlash>(
     store.delete_self_learned(of).await
 }
 
-/// Stores the table with one change.
 async fn change<F: NorFlash>(
     change: Change<'_>,
     base: &Table<'_>,
@@ -305,7 +303,6 @@ pub async fn delete<F: NorFlash>(
     Ok(())
 }
 
-/// A name as the probe has it; one that is longer than any is none.
 fn name_of(name: &str) -> Name {
     Name::try_from(name).unwrap_or_default()
 }

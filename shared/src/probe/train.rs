@@ -3,13 +3,14 @@
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
+use super::memory::Lent;
 use super::teach::delete_stale;
 use super::training::{Training, Wanted};
 use crate::dsp::Plan;
 use crate::features::{Movement, Observation, Slide};
 use crate::rig::{MAX_REJECTED, Refused, Rig, RigError};
 use crate::store::Store;
-use crate::table::{MAX_MOVEMENTS, Table};
+use crate::table::MAX_MOVEMENTS;
 use crate::up_to;
 use crate::wire::{Event, Failure, Rejection, Train};
 
@@ -23,10 +24,8 @@ use crate::wire::{Event, Failure, Rejection, Train};
 pub async fn train<R, F>(
     wanted: &Train,
     rig: &mut R,
-    store: &mut Store<F>,
-    table: Table<'_>,
+    (store, table, buffer): Lent<'_, F>,
     plan: &Plan,
-    buffer: &mut [u8],
     mut tell: impl FnMut(Event),
 ) -> Result<(), Failure>
 where

@@ -24,7 +24,7 @@ use crate::table::{
 use crate::wire::{LEAST_TRIALS, TrainingError};
 
 /// The movements of a table that is begun: the three that the paper chose.
-pub const FIRST_MOVEMENTS: [Movement; 3] = [
+pub(crate) const FIRST_MOVEMENTS: [Movement; 3] = [
     Movement::FOR_TRACTION,
     Movement::FOR_FINENESS,
     Movement::FOR_ROUGHNESS,
@@ -55,7 +55,6 @@ pub struct Wanted<'n> {
 pub struct Training {
     name: Name,
     trials: u8,
-    /// What its table knows of a texture.
     contents: Contents,
     /// Checksum of the table that there was at the beginning.
     table: Option<u32>,
@@ -180,7 +179,7 @@ impl Training {
     }
 
     /// Whether there is to be a table in the end; a pilot beside another table has only a result.
-    pub fn makes_table(&self) -> bool {
+    pub(crate) fn makes_table(&self) -> bool {
         self.makes_table
     }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::turning;
 use crate::CRC32;
+use crate::sensor::FingerModel;
 use crate::sensor::pressure::{Calibration, CalibrationError};
 
 /// Measured constants of one rig, with their dates and the sensor they belong to.
@@ -32,7 +33,19 @@ impl RigCalibration {
     /// The date of a calibration that a probe made without a computer: it has no clock.
     pub const UNDATED: u32 = 1;
 
-    /// The bit of the stored date that says that P_DC in the air is known.
+    /// The reference rig's constants with such a finger, until measured ones are read from the store.
+    pub const fn unmeasured(finger: &FingerModel) -> Self {
+        Self {
+            pressure: finger.calibration,
+            unloaded_a: (0.037, 0.0),
+            newton_per_ampere: 16.4,
+            date: 0,
+            air_known: false,
+            turned: 0,
+            serial: [0; 16],
+        }
+    }
+
     const AIR_KNOWN: u32 = 1 << 31;
 
     /// Returns the day on which the force per count was measured, see [`RigCalibration::date`]; `None` if it was not.
@@ -136,9 +149,6 @@ impl RigCalibration {
     }
 
     /// Checks a record before it moves a motor.
-    ///
-    /// # Errors
-    /// See [`RigCalibrationError`].
     #[inline(never)]
     pub fn check(&self) -> Result<(), RigCalibrationError> {
         self.pressure
@@ -219,9 +229,6 @@ impl LineFit {
     }
 
     /// Offset and slope of y = offset + slope x.
-    ///
-    /// # Errors
-    /// See [`RigCalibrationError`].
     pub fn line(&self) -> Result<(f32, f32), RigCalibrationError> {
         if self.points < 3 || self.xx <= 0.0 {
             return Err(RigCalibrationError::Points);

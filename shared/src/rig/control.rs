@@ -19,7 +19,7 @@ use crate::features::Movement;
 use crate::sensor::{FingerModel, pressure::Channel};
 
 /// Time over which the still finger is measured, ms.
-pub const BACKGROUND_MS: u32 = 1000;
+pub(crate) const BACKGROUND_MS: u32 = 1000;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
 /// The hard stop is nearer than this to where the limit switch opens, mm: it is 4 mm before it.
@@ -53,7 +53,6 @@ pub struct Control {
     compared: bool,
     /// P_DC without contact before the fault that the rig recovers from by itself: it must be found again.
     recovered: Option<f32>,
-    /// P_DC in the air, mean of the last run without load.
     air: Option<f32>,
     /// The way up, by P_DC.
     ascent: Ascent,
@@ -61,7 +60,6 @@ pub struct Control {
     still: f32,
     lever_top: Switch,
     stage_left: Switch,
-    /// Duty of the last tick.
     duty: f32,
 }
 
@@ -118,8 +116,7 @@ impl Control {
         self.stage.position_mm()
     }
 
-    /// Speed of the stage by its encoder, mm/s.
-    pub fn stage_velocity_mm_s(&self) -> f32 {
+    pub(crate) fn stage_velocity_mm_s(&self) -> f32 {
         self.stage.velocity_mm_s()
     }
 
@@ -167,9 +164,6 @@ impl Control {
     }
 
     /// Looks for the limit switches, the lever's first.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     #[inline]
     pub fn home(&mut self) -> Result<(), Refused> {
         match self.phase {
@@ -197,9 +191,6 @@ impl Control {
 
     /// Ends a fault and homes without a person. P_DC in the air must be within 40 counts of its value before: a finger
     /// that has drifted further, and would drift on, is [`Fault::LeverNotHome`].
-    ///
-    /// # Errors
-    /// As [`Control::reset`] and [`Control::home`].
     #[inline]
     pub fn recover(&mut self) -> Result<(), Refused> {
         let before = self.zeroed.then(|| self.meter.no_contact());
@@ -232,9 +223,6 @@ impl Control {
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the length that the sample leaves.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     #[inline]
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;

@@ -79,9 +79,7 @@ pub struct RigOverLink {
     /// P_DC in the air was measured since the rig homed.
     zeroed: bool,
     air: Option<f32>,
-    /// P_DC above no contact of the still finger, mean of the background.
     still: f32,
-    /// Weight that may be laid on the lifted finger, mN.
     expected_mn: f32,
 }
 
@@ -179,9 +177,6 @@ impl RigOverLink {
     }
 
     /// Orders the arm to lift the finger, and takes P_DC there as that of no contact.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     pub fn home(&mut self) -> Result<(), Refused> {
         match self.phase {
             Phase::Parked | Phase::Ready => {
@@ -210,9 +205,6 @@ impl RigOverLink {
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the length that the sample leaves.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
         let force_mn = movement.force_mn();
@@ -230,11 +222,7 @@ impl RigOverLink {
         Ok(())
     }
 
-    /// Measures P_DC in the air: [`RigOverLink::air_counts`].
-    ///
-    /// # Errors
-    /// See [`Refused`].
-    pub fn measure_air(&mut self) -> Result<(), Refused> {
+    pub(crate) fn measure_air(&mut self) -> Result<(), Refused> {
         self.may_start()?;
         self.ended = None;
         self.air = None;
@@ -244,9 +232,6 @@ impl RigOverLink {
     }
 
     /// Expects a person to lay a weight of so many mN on the lifted finger; 0 ends that.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     pub fn weigh(&mut self, mn: u16) -> Result<(), Refused> {
         self.may_start()?;
         self.expected_mn = f32::from(mn);
@@ -400,7 +385,6 @@ impl RigOverLink {
         }
     }
 
-    /// Takes the arm's progress.
     fn heard(&mut self, state: ArmState) {
         let there = match (self.phase, state) {
             (Phase::Faulted(_), ArmState::Lifted) => true,
@@ -423,7 +407,6 @@ impl RigOverLink {
         }
     }
 
-    /// Checks the time limits.
     fn wait(&mut self) {
         let (most_ms, waited_ms) = match self.phase {
             Phase::Homing | Phase::Lifting => (LIFTS_MS, self.ms),

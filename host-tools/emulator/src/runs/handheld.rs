@@ -66,7 +66,7 @@ fn slide_s(text: &str) -> Result<f64, String> {
 
 /// What the display says in the end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Told {
+enum VerdictKind {
     Sure(&'static str),
     Perhaps(&'static str),
     Unknown,
@@ -125,12 +125,12 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     };
     let told = told(board.rig().display());
     let (says, verdict) = match told {
-        Some(Told::Sure(name)) => (format!("It is {name}."), name == truth),
-        Some(Told::Perhaps(name)) => (format!("{name}?"), false),
-        Some(Told::Unknown) => ("It is none of those known.".to_owned(), false),
+        Some(VerdictKind::Sure(name)) => (format!("It is {name}."), name == truth),
+        Some(VerdictKind::Perhaps(name)) => (format!("{name}?"), false),
+        Some(VerdictKind::Unknown) => ("It is none of those known.".to_owned(), false),
         None => return Err(RunError::NoVerdict),
     };
-    let open = matches!(told, Some(Told::Perhaps(_)));
+    let open = matches!(told, Some(VerdictKind::Perhaps(_)));
     let verdict = match (verdict, open) {
         (true, _) => "Right",
         (_, true) => "Undecided",
@@ -264,9 +264,9 @@ impl Heard {
 }
 
 /// The headline of the verdict; `None` where there is none.
-fn told(display: &Display) -> Option<Told> {
+fn told(display: &Display) -> Option<VerdictKind> {
     if display.shows_large("Unknown") {
-        return Some(Told::Unknown);
+        return Some(VerdictKind::Unknown);
     }
     let is_headline = |text: &str| match text.chars().count() {
         0..=ROW => display.shows_large(text),
@@ -279,8 +279,8 @@ fn told(display: &Display) -> Option<Told> {
             .filter(|name| is_headline(&(cut(name, most) + mark)))
             .max_by_key(|name| name.len())
     };
-    let perhaps = shown(PERHAPS, "?").map(Told::Perhaps);
-    perhaps.or_else(|| shown(HEADLINE, "").map(Told::Sure))
+    let perhaps = shown(PERHAPS, "?").map(VerdictKind::Perhaps);
+    perhaps.or_else(|| shown(HEADLINE, "").map(VerdictKind::Sure))
 }
 
 /// As the display cuts a text: two points in place of what is missing.

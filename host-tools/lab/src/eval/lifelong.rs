@@ -6,7 +6,7 @@ use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{Config, Told};
+use tactus_core::explorer::{Config, VerdictKind};
 use tactus_core::features::{Observation, Vector, WHITE_STEPS};
 use tactus_core::table::{Action, Contents, EncodeError, Table, retell};
 
@@ -90,7 +90,7 @@ struct Episode {
     texture: usize,
     right: bool,
     certain: bool,
-    told: Told,
+    told: VerdictKind,
     /// Mean square distance from the table's mean of the texture, over features.
     square: f64,
 }
@@ -176,7 +176,7 @@ fn look(
     bytes: &[u8],
     movement: u8,
     slide: &Observation,
-) -> Result<(usize, bool, Told), EvaluateError> {
+) -> Result<(usize, bool, VerdictKind), EvaluateError> {
     let config = Config {
         open: true,
         ..config
@@ -190,7 +190,7 @@ fn look(
         .observe(action, slide)
         .expect("every slide has the features that the table was learned from");
     let best = explorer.best();
-    Ok((best.texture.into(), explorer.is_certain(), best.told()))
+    Ok((best.texture.into(), explorer.is_certain(), best.kind()))
 }
 
 /// A slide as the table whitens it.

@@ -1,6 +1,6 @@
 //! Pictures of `tactus evaluate`: the verdicts on each texture, and the reliability of the probabilities.
 
-use tactus_core::explorer::Told;
+use tactus_core::explorer::VerdictKind;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
@@ -32,10 +32,10 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
     for course in courses {
         let (told, _, texture) = course.told(threshold);
         let column = match told {
-            Told::Sure => texture,
-            Told::Changed => known,
-            Told::New => known + 1,
-            Told::Undecided => known + 2,
+            VerdictKind::Sure => texture,
+            VerdictKind::Changed => known,
+            VerdictKind::New => known + 1,
+            VerdictKind::Undecided => known + 2,
         };
         counts[course.presented][column] += 1;
     }

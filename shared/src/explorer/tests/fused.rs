@@ -241,7 +241,6 @@ fn explored(
     let mut recipe = Recipe::new(table, candidates);
     for slides in 1..=config.max_slides {
         let outcomes = explorer.expected_outcomes();
-        super::confusions::expect_the_same_as_kept(&explorer);
         let p: Vec<f64> = candidates
             .iter()
             .map(|&c| explorer.posterior()[usize::from(c)].into())

@@ -251,7 +251,7 @@ fn a_table_whose_bytes_have_changed_is_reported_whatever_is_in_its_place() {
 
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
     let done = block_on(probe.perform(&command));
-    done.map_err(|why| why.to_string())
+    done.map(drop).map_err(|why| why.to_string())
 }
 
 fn name(name: &str) -> Name {

@@ -184,7 +184,9 @@ pub(crate) fn day(virtual_s: f64, seed: u64, mut each: impl FnMut(f64)) -> Resul
 
 /// Sends the probe a command, as a host would; the error says why it refuses.
 fn send(probe: &mut Probe<'_>, command: Command) -> Result<(), Box<Text>> {
-    block_on(probe.perform(&command)).map_err(|why| Box::new(text(why)))
+    block_on(probe.perform(&command))
+        .map(drop)
+        .map_err(|why| Box::new(text(why)))
 }
 
 fn now_s(probe: &mut Probe<'_>) -> f64 {
