@@ -28,4 +28,4 @@ pub use picture::Picture;
 pub use screen::{About, Screen, Trouble};
 pub use speed::Moved;
 pub use spelling::{Place, WHEEL};
-pub use states::{Answer, Asked, Choice, Handheld, Job, TICKS_HZ};
+pub use states::{Answer, Choice, Handheld, Job, RequestedSlide, TICKS_HZ};

@@ -259,8 +259,7 @@ fn explore<const N: usize>(
     for p in explorer.posterior() {
         put(&p.to_le_bytes());
     }
-    let log_odds = explorer.log_odds().unwrap_or(f32::NAN);
-    put(&log_odds.to_bits().to_le_bytes());
+    put(&explorer.log_odds().unwrap_or(f32::NAN).to_le_bytes());
     let action = chosen.unwrap_or_else(|| choose(&explorer));
     put(&[action.movement]);
     for outcome in &explorer.expected_outcomes() {

@@ -2,7 +2,6 @@
 
 use super::config::{Method, ObserveError};
 use super::episode::one_more;
-use super::paced;
 use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
@@ -168,25 +167,14 @@ impl<const N: usize> Explorer<'_, N> {
         }
         self.reset_to_prior();
         // the posterior is overwritten below
-        let elsewhere = if self.table.is_paced() {
-            paced::add_likelihoods(
-                &self.table,
-                &self.episode,
-                &self.novelty_models,
-                true,
-                &mut self.log,
-                &mut self.posterior,
-            )
-        } else {
-            whitened::add_likelihoods(
-                &self.table,
-                &self.episode,
-                &self.novelty_models,
-                true,
-                &mut self.log,
-                &mut self.posterior,
-            )
-        };
+        let elsewhere = whitened::add_likelihoods(
+            &self.table,
+            &self.episode,
+            &self.novelty_models,
+            true,
+            &mut self.log,
+            &mut self.posterior,
+        );
         let (top, sum) = self.normalize();
         self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match &self.limits {
             Some(limits) => {

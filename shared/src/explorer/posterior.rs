@@ -8,7 +8,6 @@ use heapless::Vec;
 use super::config::{Config, Method};
 use super::episode::{Episode, MovementSums};
 use super::novelty::NoveltyModel;
-use super::paced;
 use super::student::ShrinkagePrior;
 use super::whitened;
 use crate::dsp::fixed::exp_neg_q30;
@@ -274,11 +273,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         let mut odds: Vec<f32, N> = up_to(log.iter().map(|_| 0.0));
         let (table, models) = (&self.table, &self.novelty_models);
         let drifting = against == Against::Drifted;
-        let (elsewhere, _) = if table.is_paced() {
-            paced::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
-        } else {
-            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
-        };
+        let (elsewhere, _) =
+            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?;
         let top = log.iter().copied().max().unwrap_or(0);
         Some(elsewhere - top as f32 / 65536.0)
     }
@@ -308,7 +304,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
     /// At each of [`Explorer::observed`] the mean of ln(speed): see [`super::EpisodeSummary::paces`].
     pub fn paces(&self) -> impl Iterator<Item = i16> + '_ {
         let slopes = |movement| self.table.slopes_at(movement);
-        let pace = move |v: &MovementSums| slopes(v.movement).map_or(0, |s| v.pace(&s).0);
+        let pace = move |v: &MovementSums| slopes(v.movement).map_or(0, |s| v.pace(s).mean);
         self.whole_slides().map(pace)
     }
 

@@ -7,7 +7,7 @@ use super::jobs::{Outcome, work};
 use super::judge::MOVEMENT;
 use super::screen::{About, Screen};
 use super::speed::Moved;
-use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
+use super::states::{Answer, Handheld, Job, RequestedSlide, TICKS_HZ};
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, Watch};
@@ -100,7 +100,7 @@ pub struct ByHand<'p, H> {
     ticks: u32,
     /// Last prompt that was sent to the host, and its time.
     prompt: (Option<Prompt>, u32),
-    asked: Asked,
+    asked: RequestedSlide,
     /// Share of the memory for textures that is taken.
     memory: f32,
     serves: bool,
@@ -119,7 +119,7 @@ impl<'p, H: Hand> ByHand<'p, H> {
             tone: None,
             ticks: 0,
             prompt: (None, 0),
-            asked: Asked::default(),
+            asked: RequestedSlide::default(),
             memory: 0.0,
             serves: false,
         };
@@ -440,17 +440,17 @@ where
 }
 
 /// The slides and the texture of a request that the display names.
-fn asked(command: &Command) -> (Asked, Option<Name>) {
+fn asked(command: &Command) -> (RequestedSlide, Option<Name>) {
     match command {
         Command::Identify(wanted) | Command::Verify(wanted) => (
-            Asked {
+            RequestedSlide {
                 slide: 0,
                 of: wanted.max_slides,
             },
             None,
         ),
-        Command::Train(wanted) => (Asked::default(), Some(wanted.name.clone())),
-        _ => (Asked::default(), None),
+        Command::Train(wanted) => (RequestedSlide::default(), Some(wanted.name.clone())),
+        _ => (RequestedSlide::default(), None),
     }
 }
 

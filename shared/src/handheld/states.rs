@@ -60,7 +60,7 @@ pub enum Job {
 
 /// The slide that the host wants.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Asked {
+pub struct RequestedSlide {
     /// Its number, from 1.
     pub slide: u8,
     /// Largest number of slides; 0 if unknown.
@@ -140,7 +140,7 @@ pub struct Handheld<'p> {
     note: u8,
     fresh: bool,
     /// The host's slide, and the result of its request.
-    asked: Option<Asked>,
+    asked: Option<RequestedSlide>,
     answer: Option<Answer>,
 }
 
@@ -354,15 +354,7 @@ impl<'p> Handheld<'p> {
                 })
                 .collect()
         };
-        let (slide, of) = match &self.asked {
-            Some(asked) => (asked.slide, asked.of),
-            None if self.training => (self.episode.len() as u8 + 1, TRAINING_SLIDES as u8),
-            None => {
-                let goes_on = self.episode.len() >= ASK_AFTER && self.reference.is_none();
-                let of = if goes_on { MAX_SLIDES } else { ASK_AFTER };
-                (self.episode.len() as u8 + 1, of as u8)
-            }
-        };
+        let (slide, of) = self.slide_number();
         match &self.page {
             Page::Ready if !self.touch.has_zero() => Screen::Air,
             Page::Ready => Screen::Ready {
@@ -422,6 +414,19 @@ impl<'p> Handheld<'p> {
             Page::Turn(over) => Screen::Turn { over: *over },
             Page::Turned(done) => Screen::Turned(*done),
             Page::Dark => Screen::Dark,
+        }
+    }
+
+    /// The slide that is made next, and the largest number of slides.
+    fn slide_number(&self) -> (u8, u8) {
+        match &self.asked {
+            Some(asked) => (asked.slide, asked.of),
+            None if self.training => (self.episode.len() as u8 + 1, TRAINING_SLIDES as u8),
+            None => {
+                let goes_on = self.episode.len() >= ASK_AFTER && self.reference.is_none();
+                let of = if goes_on { MAX_SLIDES } else { ASK_AFTER };
+                (self.episode.len() as u8 + 1, of as u8)
+            }
         }
     }
 

@@ -199,14 +199,14 @@ pub trait Servo {
 }
 
 /// What a person is asked to do to a lifted finger, and what came of it so far.
-enum Asked {
+enum PersonTask {
     /// To lay a weight of so many mN on it: counts above the air. It is over when the weight was taken away again.
     Weight(u16, Weighing, Option<f32>),
     /// To turn it over.
     Turn(Turning, Option<Turned>),
 }
 
-impl Asked {
+impl PersonTask {
     fn prompt(&self) -> Prompt {
         match self {
             Self::Weight(mn, weighing, None) if weighing.wants_weight() => Prompt::Weigh(*mn),
@@ -282,7 +282,7 @@ impl<S: Servo> ServoRig<S> {
     }
 
     /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is done.
-    async fn with_person(&mut self, mn: u16, asked: &mut Asked) -> Result<(), RigError> {
+    async fn with_person(&mut self, mn: u16, asked: &mut PersonTask) -> Result<(), RigError> {
         if self.rest().await?.phase == Phase::Parked {
             self.home().await?;
         }
@@ -379,11 +379,11 @@ impl<S: Servo> RigHandle for ServoRig<S> {
 
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure> {
         let scale = self.servo.state().calibration.pressure.force_mn_per_count;
-        let mut weight = Asked::Weight(mn, Weighing::new(mn, scale), None);
+        let mut weight = PersonTask::Weight(mn, Weighing::new(mn, scale), None);
         let done = self.with_person(mn, &mut weight).await;
         done.map_err(Failure::Rig)?;
         match weight {
-            Asked::Weight(_, _, Some(counts)) => Ok(counts),
+            PersonTask::Weight(_, _, Some(counts)) => Ok(counts),
             _ => Err(Failure::Rig(RigError::NobodyThere)),
         }
     }
@@ -392,11 +392,11 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         if self.servo.gravity().is_none() {
             return Err(Failure::OtherProbe);
         }
-        let mut turn = Asked::Turn(Turning::default(), None);
+        let mut turn = PersonTask::Turn(Turning::default(), None);
         let done = self.with_person(TURNED_MN, &mut turn).await;
         done.map_err(Failure::Rig)?;
         match turn {
-            Asked::Turn(_, Some(turned)) => Ok(turned),
+            PersonTask::Turn(_, Some(turned)) => Ok(turned),
             _ => Err(Failure::Rig(RigError::NobodyThere)),
         }
     }

@@ -50,6 +50,32 @@ pub struct Wanted<'n> {
     pub most_mn: u16,
 }
 
+/// Returns an error if what is wanted cannot be learned into such a table.
+fn check(contents: Contents, wanted: &Wanted<'_>) -> Result<(), TrainingError> {
+    match contents {
+        Contents::Gaussians(measured) => {
+            if wanted.trials < LEAST_TRIALS {
+                return Err(TrainingError::Trials(wanted.trials));
+            }
+            if measured.is_empty() {
+                return Err(TrainingError::Measures(None));
+            }
+            if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
+                return Err(TrainingError::Measures(Some(missing)));
+            }
+        }
+        Contents::Fused(set, _) => {
+            if wanted.trials == 0 {
+                return Err(TrainingError::Trials(0));
+            }
+            if !set.measured_by(wanted.measures) {
+                return Err(TrainingError::Features(set));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// A texture that is being learned.
 #[derive(Clone, Debug)]
 pub struct Training {
@@ -93,27 +119,7 @@ impl Training {
             Some(table) if !table.measured().is_empty() => table.contents(),
             _ => Contents::Gaussians(wanted.measures),
         };
-        match contents {
-            Contents::Gaussians(measured) => {
-                if wanted.trials < LEAST_TRIALS {
-                    return Err(TrainingError::Trials(wanted.trials));
-                }
-                if measured.is_empty() {
-                    return Err(TrainingError::Measures(None));
-                }
-                if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
-                    return Err(TrainingError::Measures(Some(missing)));
-                }
-            }
-            Contents::Fused(set, _) => {
-                if wanted.trials == 0 {
-                    return Err(TrainingError::Trials(0));
-                }
-                if !set.measured_by(wanted.measures) {
-                    return Err(TrainingError::Features(set));
-                }
-            }
-        }
+        check(contents, &wanted)?;
         let untouched = match contents {
             Contents::Gaussians(_) => TrainingStats::Gaussians(Experience::default()),
             Contents::Fused(..) => TrainingStats::Fused(Whitened::default()),

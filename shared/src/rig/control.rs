@@ -456,40 +456,8 @@ impl Control {
             Phase::Parked | Phase::Faulted(_) => {}
             Phase::Ready if self.lever.wait() => self.ascent.set_out(self.meter.mean()),
             Phase::Ready => {}
-            Phase::Homing => {
-                if self.lever.is_lifted() {
-                    match self.stage.state() {
-                        // a switch with a broken wire is closed everywhere: do not drag the finger along
-                        StageState::Unknown => {
-                            let mean = self.meter.mean();
-                            if self.is_pressed(mean) {
-                                self.check(Fault::LeverNotHome);
-                            }
-                            // before there are 10 ms of P_DC nothing is known; the guard sees to it that they come
-                            let known = mean.is_some() || !self.calibration.air_known;
-                            if known && self.phase == Phase::Homing {
-                                self.stage.home();
-                            }
-                        }
-                        StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
-                            self.stage.go(MARGIN_MM, RETURN_MM_S);
-                        }
-                        // it stood beyond the switch, towards its hard stop: the origin is where the switch opens
-                        StageState::Standing
-                            if self.stage.is_searched() && inputs.stage_limits.0 =>
-                        {
-                            let to = self.stage.position_mm() + MARGIN_MM;
-                            if to > BEYOND_MM {
-                                self.check(Fault::StageNotHome);
-                            }
-                            self.stage.go(to, RETURN_MM_S);
-                        }
-                        StageState::Standing if self.stage.is_searched() => self.stage.home(),
-                        StageState::Standing => self.enter(Phase::Ready),
-                        _ => {}
-                    }
-                }
-            }
+            Phase::Homing if self.lever.is_lifted() => self.home_stage(inputs),
+            Phase::Homing => {}
             Phase::Positioning => {
                 if self.stage.state() == StageState::Standing && !self.lever.is_parking() {
                     let target = f32::from(self.run.movement().force_mn())
@@ -529,31 +497,7 @@ impl Control {
                     self.enter(Phase::Sliding);
                 }
             }
-            Phase::Sliding => {
-                let speed_mm_s = self.run.movement().speed_mm_s();
-                let shear_n = self.calibration.shear_n(inputs.current_a, speed_mm_s);
-                self.run.slid(self.ms, shear_n, inputs, outputs);
-                self.skin
-                    .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
-                if self.stage.state() == StageState::Standing {
-                    let felt = self.meter.long_counts().unwrap_or_default();
-                    let (mn, share) = SLIDE_OFF;
-                    let most = self.finger.counts(mn) + share * self.still;
-                    if libm::fabsf(felt - self.still) > most {
-                        self.check(Fault::Unsteady);
-                    }
-                }
-                if self.phase == Phase::Sliding && self.stage.state() == StageState::Standing {
-                    let ended = self.run.ended(self.ms);
-                    self.ended = Some(if self.guard.looks_for(Fault::SlideGap) {
-                        ended
-                    } else {
-                        Ended::Whole
-                    });
-                    self.lever.lift(inputs.steps);
-                    self.enter(Phase::Lifting);
-                }
-            }
+            Phase::Sliding => self.advance_slide(inputs, outputs),
             Phase::Unloaded => {
                 self.run.weigh_current(self.ms, inputs);
                 if self.stage.state() == StageState::Standing {
@@ -575,6 +519,66 @@ impl Control {
                     }
                 }
             }
+        }
+    }
+
+    /// The way of the stage to its switch and off it, once the finger is lifted.
+    #[inline]
+    fn home_stage(&mut self, inputs: &Inputs) {
+        match self.stage.state() {
+            // a switch with a broken wire is closed everywhere: do not drag the finger along
+            StageState::Unknown => {
+                let mean = self.meter.mean();
+                if self.is_pressed(mean) {
+                    self.check(Fault::LeverNotHome);
+                }
+                // before there are 10 ms of P_DC nothing is known; the guard sees to it that they come
+                let known = mean.is_some() || !self.calibration.air_known;
+                if known && self.phase == Phase::Homing {
+                    self.stage.home();
+                }
+            }
+            StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
+                self.stage.go(MARGIN_MM, RETURN_MM_S);
+            }
+            // it stood beyond the switch, towards its hard stop: the origin is where the switch opens
+            StageState::Standing if self.stage.is_searched() && inputs.stage_limits.0 => {
+                let to = self.stage.position_mm() + MARGIN_MM;
+                if to > BEYOND_MM {
+                    self.check(Fault::StageNotHome);
+                }
+                self.stage.go(to, RETURN_MM_S);
+            }
+            StageState::Standing if self.stage.is_searched() => self.stage.home(),
+            StageState::Standing => self.enter(Phase::Ready),
+            _ => {}
+        }
+    }
+
+    #[inline]
+    fn advance_slide(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        let speed_mm_s = self.run.movement().speed_mm_s();
+        let shear_n = self.calibration.shear_n(inputs.current_a, speed_mm_s);
+        self.run.slid(self.ms, shear_n, inputs, outputs);
+        self.skin
+            .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
+        if self.stage.state() == StageState::Standing {
+            let felt = self.meter.long_counts().unwrap_or_default();
+            let (mn, share) = SLIDE_OFF;
+            let most = self.finger.counts(mn) + share * self.still;
+            if libm::fabsf(felt - self.still) > most {
+                self.check(Fault::Unsteady);
+            }
+        }
+        if self.phase == Phase::Sliding && self.stage.state() == StageState::Standing {
+            let ended = self.run.ended(self.ms);
+            self.ended = Some(if self.guard.looks_for(Fault::SlideGap) {
+                ended
+            } else {
+                Ended::Whole
+            });
+            self.lever.lift(inputs.steps);
+            self.enter(Phase::Lifting);
         }
     }
 }

@@ -297,6 +297,35 @@ impl Lever {
         self.ms = 0;
     }
 
+    #[inline]
+    fn go_up(&mut self, steps: i32, at_top: bool) -> Result<i32, Fault> {
+        // Lower than it was, the lever continues: if the switch is stuck, that is right; if steps were lost, it
+        // stands at its hard stop until the count is right again. Higher, and steps up were lost: there the top
+        // is now.
+        if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
+            self.top = if self.known {
+                self.top.min(steps)
+            } else {
+                steps
+            };
+            self.known = true;
+            self.at_switch = true;
+            if !self.is_parking() {
+                self.contact = None;
+                self.zero = None;
+            }
+            self.enter(LeverState::Lifted);
+            return Ok(0);
+        }
+        // the whole travel and a quarter, at the speed of lifting
+        let longest_ms = MAX_STEPS as u32 * 1250 / RETRACT_STEPS_S.unsigned_abs();
+        if self.ms > longest_ms {
+            Err(Fault::LeverNotHome)
+        } else {
+            Ok(RETRACT_STEPS_S)
+        }
+    }
+
     /// One millisecond: `steps` made so far (downwards positive), and whether the limit switch is pressed. Returns the
     /// steps per second to make now, downwards positive.
     ///
@@ -312,33 +341,7 @@ impl Lever {
         self.ms = self.ms.saturating_add(1);
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
-            LeverState::Homing | LeverState::Parking => {
-                // Lower than it was, the lever continues: if the switch is stuck, that is right; if steps were lost, it
-                // stands at its hard stop until the count is right again. Higher, and steps up were lost: there the top
-                // is now.
-                if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
-                    self.top = if self.known {
-                        self.top.min(steps)
-                    } else {
-                        steps
-                    };
-                    self.known = true;
-                    self.at_switch = true;
-                    if !self.is_parking() {
-                        self.contact = None;
-                        self.zero = None;
-                    }
-                    self.enter(LeverState::Lifted);
-                    return Ok(0);
-                }
-                // the whole travel and a quarter, at the speed of lifting
-                let longest_ms = MAX_STEPS as u32 * 1250 / RETRACT_STEPS_S.unsigned_abs();
-                if self.ms > longest_ms {
-                    Err(Fault::LeverNotHome)
-                } else {
-                    Ok(RETRACT_STEPS_S)
-                }
-            }
+            LeverState::Homing | LeverState::Parking => self.go_up(steps, at_top),
             LeverState::Zeroing => {
                 if self.ms == QUIET_MS {
                     meter.begin_long();

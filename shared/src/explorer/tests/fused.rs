@@ -225,22 +225,9 @@ impl Agreement {
     }
 }
 
-/// Explores to the last slide, and compares every step with the recipe.
-fn explored(
-    table: Table<'_>,
-    set: FeatureSet,
-    candidates: &[u16],
-    config: Config,
-    mut slide: impl FnMut(u8) -> Vec<i16>,
-    agreement: &mut Agreement,
-) {
-    let among = candidates.to_vec();
-    let Ok(mut explorer) = Twenty::among(table, PropertySet::ALL, config, among) else {
-        return;
-    };
-    let mut recipe = Recipe::new(table, candidates);
-    for slides in 1..=config.max_slides {
-        let outcomes = explorer.expected_outcomes();
+impl Recipe {
+    fn expects(&self, explorer: &Twenty<'_>, candidates: &[u16], outcomes: &[ExpectedOutcome]) {
+        let table = explorer.table();
         let p: Vec<f64> = candidates
             .iter()
             .map(|&c| explorer.posterior()[usize::from(c)].into())
@@ -254,36 +241,28 @@ fn explored(
                 .map(|o| o.action)
                 .eq(movements.iter().map(|&m| look(m)))
         );
-        for o in &outcomes {
+        for o in outcomes {
             let movement = o.action.movement.into();
-            let difference = f64::from(o.uncertainty) - recipe.uncertainty(movement, &p);
+            let difference = f64::from(o.uncertainty) - self.uncertainty(movement, &p);
             assert!(difference.abs() < 3e-4, "{o:?}: {difference}");
-            let made = recipe.made.get(&movement).copied().unwrap_or(0.0);
+            let made = self.made.get(&movement).copied().unwrap_or(0.0);
             let benefit = 1.0
                 - f64::from(o.uncertainty)
                     .clamp(0.0, 1.0)
                     .powf(1.0 / (made + 1.0));
             assert!((f64::from(o.benefit) - benefit).abs() < 1e-5, "{o:?}");
             if o.uncertainty > 0.01 {
-                let difference = f64::from(o.benefit) - recipe.benefit(movement, &p);
+                let difference = f64::from(o.benefit) - self.benefit(movement, &p);
                 assert!(difference.abs() < 1e-3, "{o:?}: {difference}");
             }
         }
-        let action = explorer.choose(&outcomes, 0);
-        let most = outcomes.iter().map(|o| o.benefit).fold(0.0, f32::max);
-        let first = outcomes.iter().find(|o| o.benefit == most);
-        assert_eq!(first.unwrap().action, action);
-        let x = slide(action.movement);
-        explorer.observe(action, &with_features(set, &x)).unwrap();
-        recipe.observe(action.movement, &table.whiten(action.movement, &x).unwrap());
-        let untaught = candidates
-            .iter()
-            .any(|&c| table.trials(c, action.movement) == 0);
-        agreement.untaught += u32::from(untaught);
+    }
 
-        let (p, log_odds) = recipe.decide(true);
+    fn tells(&self, explorer: &Twenty<'_>, candidates: &[u16], agreement: &mut Agreement) {
+        let (config, slides) = (explorer.config, explorer.slides());
+        let (p, log_odds) = self.decide(true);
         // of every movement: what the line between two entries of a logarithm's table is off
-        let slides_made = recipe.episodes.len() as f64;
+        let slides_made = self.episodes.len() as f64;
         let mut total = 0.0;
         for (&c, p) in candidates.iter().zip(&p) {
             let posterior = f64::from(explorer.posterior()[usize::from(c)]);
@@ -306,7 +285,7 @@ fn explored(
             assert!(error < 1e-3 + 3e-3 * slides_made, "{found} {expected}");
         }
         // the verdict, and what the mean's rounding may change: little
-        let (rounded, (p, log_odds)) = (p, recipe.decide(false));
+        let (rounded, (p, log_odds)) = (p, self.decide(false));
         for (p, rounded) in p.iter().zip(&rounded) {
             assert!((p - rounded).abs() < 0.01, "{p} {rounded}");
         }
@@ -337,6 +316,38 @@ fn explored(
         if let Some(verdict) = explorer.verdict() {
             assert_eq!(verdict, explorer.best());
         }
+    }
+}
+
+/// Explores to the last slide, and compares every step with the recipe.
+fn explored(
+    table: Table<'_>,
+    set: FeatureSet,
+    candidates: &[u16],
+    config: Config,
+    mut slide: impl FnMut(u8) -> Vec<i16>,
+    agreement: &mut Agreement,
+) {
+    let among = candidates.to_vec();
+    let Ok(mut explorer) = Twenty::among(table, PropertySet::ALL, config, among) else {
+        return;
+    };
+    let mut recipe = Recipe::new(table, candidates);
+    for _ in 1..=config.max_slides {
+        let outcomes = explorer.expected_outcomes();
+        recipe.expects(&explorer, candidates, &outcomes);
+        let action = explorer.choose(&outcomes, 0);
+        let most = outcomes.iter().map(|o| o.benefit).fold(0.0, f32::max);
+        let first = outcomes.iter().find(|o| o.benefit == most);
+        assert_eq!(first.unwrap().action, action);
+        let x = slide(action.movement);
+        explorer.observe(action, &with_features(set, &x)).unwrap();
+        recipe.observe(action.movement, &table.whiten(action.movement, &x).unwrap());
+        let untaught = candidates
+            .iter()
+            .any(|&c| table.trials(c, action.movement) == 0);
+        agreement.untaught += u32::from(untaught);
+        recipe.tells(&explorer, candidates, agreement);
     }
     // what can be learned of it
     let observed: Vec<_> = explorer.observed().collect();
