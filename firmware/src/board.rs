@@ -88,12 +88,10 @@ assign_resources! {
         blue: PB7,
         red: PB14 = RedLed,
     }
-    /// Follows `verify`.
     go: Go {
         /// High is "the same".
         same: PC10,
     }
-    /// Of the handheld probe.
     display: Display {
         i2c: I2C1,
         scl: PB8,

@@ -219,7 +219,6 @@ impl Bench {
         }
     }
 
-    /// After a move, whether it ended or was left.
     fn rested(&mut self) {
         self.motors.stop();
         rescue::ARMED.store(false, Relaxed);

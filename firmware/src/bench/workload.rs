@@ -15,8 +15,6 @@ use tactus_core::table::{Action, Table};
 /// Forces in a block: one each tick of the servo's.
 const SHEARS: usize = BLOCK * 1000 / RATE_HZ as usize;
 const CAPACITY: usize = tactus_core::table::MAX_TEXTURES;
-/// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
-pub const MOST_TEXTURES: usize = 1500;
 
 /// What is counted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -174,21 +172,20 @@ pub fn run(
             });
             put_observation(&observed.ok()?, put);
         }
-        _ => {
-            let table = Table::read(table).ok()?;
-            if usize::from(table.textures()) <= CAPACITY {
-                explore::<CAPACITY>(workload, plan, table, words, counter, put)?;
-            } else {
-                explore::<MOST_TEXTURES>(workload, plan, table, words, counter, put)?;
-            }
-        }
+        _ => explore(
+            workload,
+            plan,
+            Table::read(table).ok()?,
+            words,
+            counter,
+            put,
+        )?,
     }
     Some(())
 }
 
-// a stack frame of its own: the frame with the larger buffer would not fit beside any other
 #[inline(never)]
-fn explore<const N: usize>(
+fn explore(
     workload: Workload,
     plan: &Plan,
     table: Table<'_>,
@@ -201,13 +198,13 @@ fn explore<const N: usize>(
         method: observed.method,
         ..Config::default()
     };
-    let begin = || Explorer::<N>::new(table, PropertySet::ALL, config);
+    let begin = || Explorer::<CAPACITY>::new(table, PropertySet::ALL, config);
     let mut explorer = if workload == Workload::Begin {
         counter.count(begin).ok()?
     } else {
         begin().ok()?
     };
-    let choose = |explorer: &Explorer<'_, N>| {
+    let choose = |explorer: &Explorer<'_, CAPACITY>| {
         let mut outcomes = Vec::new();
         explorer.evaluate_actions(&mut outcomes);
         black_box(explorer.choose(black_box(&outcomes), 0))

@@ -82,7 +82,6 @@ impl Motors {
         current::amperes(mean) - current::amperes(self.zero)
     }
 
-    /// Another point; those that find no room are left out.
     fn note(&mut self, x: f32, y: f32) {
         // the conversion saturates
         let _ = self.series.push([x as i16, y as i16]);
@@ -154,7 +153,6 @@ impl Motors {
         self.drive_lever(touch, RETRACT_STEPS_S, most, true).await
     }
 
-    /// Moves the stage by at least [`STAGE_MM`] and brakes it.
     pub(super) async fn move_stage(&mut self, to_the_right: bool) -> StageSeen {
         self.pins.bridge.set_high();
         let moved = self.moved(if to_the_right { 1.0 } else { -1.0 }).await;

@@ -124,7 +124,6 @@ impl Sensor {
     }
 }
 
-/// What a second of words said.
 #[derive(Default)]
 pub(super) struct Second {
     pub(super) words: u32,

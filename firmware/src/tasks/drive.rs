@@ -231,7 +231,6 @@ impl Ticks {
         inputs
     }
 
-    /// The command that the session has given, if there is one; `apply` does it.
     pub(super) fn obey(&mut self, apply: impl FnOnce(RigCommand) -> Result<(), Refused>) {
         if let Some(command) = COMMAND.try_take() {
             self.ended = None;

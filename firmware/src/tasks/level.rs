@@ -7,7 +7,6 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 
 use crate::chip::rescue;
 
-/// The level of the tasks that talk to the host.
 pub(crate) struct OneLevel;
 
 /// Whether this runs where an image's tasks for the host do. An image has those of one level only: `rig.rs`, `handheld.rs`.

@@ -104,7 +104,6 @@ impl<'t, const N: usize> Explorer<'t, N> {
         Ok(())
     }
 
-    /// Takes from the table what its textures have in common.
     fn learn_of_all(&mut self) {
         let table = self.table;
         if let Method::Student | Method::StudentAll = self.config.method {

@@ -21,7 +21,6 @@ pub struct Look {
 }
 
 impl Look {
-    /// Whether the slide may end: see [`most_doubt`].
     pub(crate) fn is_enough(&self, most_doubt: f32) -> bool {
         self.known && self.doubt <= most_doubt
     }
@@ -99,7 +98,6 @@ impl<const N: usize> Explorer<'_, N> {
         }
     }
 
-    /// The place of an action, and what stands for it in the table at this length.
     fn part(&mut self, action: Action, n: u8) -> Option<(usize, Action)> {
         let least = match (self.config.method, action.property) {
             (Method::Fused, None) => 1,

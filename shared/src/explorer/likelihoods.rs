@@ -83,7 +83,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// Adds the likelihood of the mean `x` of so many slides to every logarithm.
     fn add_students(&mut self, x: f32, movement: u8, property: Property, slides: u8) {
         let mut student: Option<Student> = None;
         for texture in 0..self.table.textures() {

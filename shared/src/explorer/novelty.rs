@@ -13,7 +13,6 @@ const WIDE: f32 = 400.0;
 pub(super) enum Source {
     /// There are too few of them to tell.
     Nowhere,
-    /// Their means.
     Means,
     /// The table says it: mean and variances of a [`NoveltyModel`] are not used.
     Table,

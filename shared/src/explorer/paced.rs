@@ -13,7 +13,6 @@ use crate::table::{PAIRS, SlopesView, moved};
 /// Whitened numbers, as many as the most features.
 type White = [i16; MAX_FEATURES];
 
-/// ln(speed) of the slides at a movement.
 pub(super) struct Pace<'a> {
     /// Its mean, in 1/1024.
     pub(super) mean: i16,

@@ -94,7 +94,6 @@ pub struct Explorer<'t, const N: usize> {
     pub(super) slides: u8,
     /// Slides of each movement that came to nothing, since one of it counted.
     pub(super) failed: Vec<u8, MAX_MOVEMENTS>,
-    /// The slides of this exploration, for the methods that take their mean.
     pub(super) episode: Episode,
     pub(super) log_odds: Option<f32>,
     /// For Student's t: movement by movement, properties in their order.

@@ -98,10 +98,8 @@ pub struct ByHand<'p, H> {
     listens: bool,
     tone: Option<u16>,
     ticks: u32,
-    /// Last prompt that was sent to the host, and its time.
     prompt: (Option<Prompt>, u32),
     asked: RequestedSlide,
-    /// Share of the memory for textures that is taken.
     memory: f32,
     serves: bool,
 }
@@ -439,7 +437,6 @@ where
     }
 }
 
-/// The slides and the texture of a request that the display names.
 fn asked(command: &Command) -> (RequestedSlide, Option<Name>) {
     match command {
         Command::Identify(wanted) | Command::Verify(wanted) => (

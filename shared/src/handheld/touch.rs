@@ -102,7 +102,6 @@ pub struct Touch<'p> {
     /// P_AC in the air: mean and liveliness.
     rest: f32,
     air: f32,
-    /// Mean P_DC of the latest blocks.
     forces: Deque<f32, STEADY_FORCE>,
     /// Blocks in a row that are down, or up.
     changes: u8,

@@ -18,15 +18,12 @@ pub struct Memory<'m, F, B> {
     /// Or why it could not be opened.
     store: Result<Store<F>, StoreError>,
     stored: B,
-    /// The table that comes with the firmware.
     factory: &'m [u8],
     /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
     /// table is made here too; afterwards [`Memory::reload`] is due.
     buffer: &'m mut [u8],
     length: Result<usize, MemoryError>,
-    /// No texture was learned and no table was written.
     is_factory: bool,
-    /// Why another table is in force than the one that was stored last.
     instead: Option<MemoryError>,
     /// Share of false alarms that limits are for; the table's own, unless set.
     pub false_alarm: Option<f32>,

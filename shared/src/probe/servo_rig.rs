@@ -202,7 +202,6 @@ pub trait Servo {
 enum PersonTask {
     /// To lay a weight of so many mN on it: counts above the air. It is over when the weight was taken away again.
     Weight(u16, Weighing, Option<f32>),
-    /// To turn it over.
     Turn(Turning, Option<Turned>),
 }
 

@@ -118,7 +118,6 @@ async fn keep<F: NorFlash>(
     Ok(())
 }
 
-/// Takes what a slide adds.
 fn take(
     training: &mut Training,
     table: &Table<'_>,

@@ -82,11 +82,8 @@ pub struct Training {
     name: Name,
     trials: u8,
     contents: Contents,
-    /// Checksum of the table that there was at the beginning.
     table: Option<u32>,
-    /// Whether trials of that table are counted in.
     goes_on: bool,
-    /// Whether a table can be made of it.
     makes_table: bool,
     learned: Vec<(Movement, TrainingStats), MAX_MOVEMENTS>,
 }

@@ -80,7 +80,6 @@ pub enum ArmState {
     Failed,
 }
 
-/// The open order, and the time of the last message about it.
 #[derive(Clone, Debug)]
 pub(super) struct Orders {
     order: ArmOrder,

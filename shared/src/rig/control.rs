@@ -54,7 +54,6 @@ pub struct Control {
     /// P_DC without contact before the fault that the rig recovers from by itself: it must be found again.
     recovered: Option<f32>,
     air: Option<f32>,
-    /// The way up, by P_DC.
     ascent: Ascent,
     /// P_DC above no contact of the still finger, mean of the background.
     still: f32,

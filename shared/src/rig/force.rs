@@ -35,7 +35,6 @@ impl ForceMeter {
         }
     }
 
-    /// Takes one sample of P_DC.
     pub(crate) fn push(&mut self, counts: Counts) {
         let counts = counts.get();
         // the core divides in 12 cycles
@@ -130,7 +129,6 @@ impl ForceMeter {
         (samples > 0).then(|| (f64::from(sum) / f64::from(samples)) as f32)
     }
 
-    /// Counts that mean no contact.
     pub(crate) fn no_contact(&self) -> f32 {
         self.no_contact
     }

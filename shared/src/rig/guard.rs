@@ -79,7 +79,6 @@ impl Unguarded {
 pub(crate) struct GuardInputs<'a> {
     /// Words since the last millisecond; `None` is a damaged one.
     pub(crate) words: &'a [Option<Pressure>],
-    /// The emergency stop.
     pub(crate) e_stop: bool,
     /// True if the tasks that the rig serves have not checked in.
     pub(crate) hung: bool,

@@ -109,7 +109,6 @@ pub(crate) enum LeverState {
     Homing,
     /// The same of a lifted finger that waits: the place of the sample stays known.
     Parking,
-    /// Lifted and standing.
     Lifted,
     /// Lifted, and P_DC without contact is measured.
     Zeroing,
@@ -125,7 +124,6 @@ pub(crate) enum LeverState {
     Retracting(i32),
 }
 
-/// The state machine of the lever.
 #[derive(Clone, Debug)]
 pub(crate) struct Lever {
     finger: &'static FingerModel,
@@ -192,7 +190,6 @@ impl Lever {
         *self = Self::with(self.finger, self.progress.clone());
     }
 
-    /// Takes a sample of P_AC.
     pub(crate) fn hear(&mut self, pac: Counts, calibration: &Calibration) {
         match self.state {
             LeverState::Lifted | LeverState::Zeroing => self.progress.rest(pac.get()),
@@ -201,7 +198,6 @@ impl Lever {
         }
     }
 
-    /// The current state.
     pub(crate) fn state(&self) -> LeverState {
         self.state
     }
@@ -273,7 +269,6 @@ impl Lever {
         lifted
     }
 
-    /// Lifts the finger clear of the sample.
     pub(crate) fn lift(&mut self, steps: i32) {
         match self.contact {
             Some(contact) if self.state != LeverState::Unknown => {

@@ -84,7 +84,6 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Checks such a finger by all guards but `unguarded`.
     pub(super) fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
         Self {
             finger,

@@ -41,7 +41,6 @@ impl Sum {
 /// Sliding since the skin was replaced.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct SkinCare {
-    /// Energy in J, plain and weighted.
     energy_j: Sum,
     wear_j: Sum,
 }

@@ -81,9 +81,7 @@ pub(crate) enum StageState {
     Unknown,
     /// Towards the left limit switch.
     Homing(Profile),
-    /// Standing; the motor is off.
     Standing,
-    /// On its way.
     Moving(Profile),
 }
 
@@ -167,7 +165,6 @@ impl Profile {
     }
 }
 
-/// The state machine of the stage.
 #[derive(Clone, Debug)]
 pub(crate) struct Stage {
     constants: StageConstants,
@@ -191,12 +188,10 @@ impl Stage {
         }
     }
 
-    /// The current state.
     pub(crate) fn state(&self) -> StageState {
         self.state
     }
 
-    /// Its constants.
     pub(crate) fn constants(&self) -> &StageConstants {
         &self.constants
     }
@@ -258,7 +253,6 @@ impl Stage {
         self.searched = false;
     }
 
-    /// The motor goes off, from any state.
     pub(crate) fn stop(&mut self) {
         if self.searched || matches!(self.state, StageState::Unknown | StageState::Homing(_)) {
             self.forget();

@@ -37,7 +37,6 @@ impl Still {
     }
 }
 
-/// The air, and then one weight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Weighing {
     /// Counts by which a weight differs from the air at least.

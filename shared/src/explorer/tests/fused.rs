@@ -531,43 +531,6 @@ fn beyond_255_slides_nothing_changes() {
     }
 }
 
-#[test]
-fn the_order_of_slides_does_not_matter() {
-    for seed in 0..100 {
-        let noise = &mut Noise(seed);
-        let mut cell = || {
-            let mean: Vec<f64> = (0..5).map(|_| 2.0 * noise.normal()).collect();
-            known((noise.uniform() * 4.0) as u8, &mean)
-        };
-        let table: Vec<Vec<Whitened>> = (0..6)
-            .map(|_| vec![cell(), cell(), known(3, &[0.5; 5])])
-            .collect();
-        let bytes = straight_table(5, &table);
-        let mut slides: Vec<(u8, Observation)> = (0..7)
-            .map(|_| {
-                let z: Vec<f64> = (0..5).map(|_| 2.0 * noise.normal()).collect();
-                (noise.below(3) as u8, at(&z))
-            })
-            .collect();
-        let (mut there, mut back) = (fused(&bytes, OPEN), fused(&bytes, OPEN));
-        for (movement, slide) in &slides {
-            // a movement that no texture has is none of the actions
-            let _ = there.observe(look(*movement), slide);
-        }
-        slides.reverse();
-        for (movement, slide) in &slides {
-            let _ = back.observe(look(*movement), slide);
-        }
-        assert!(there.slides() > 0);
-        assert_eq!(there.posterior(), back.posterior());
-        let (a, b) = (
-            there.log_odds().unwrap_or(0.0),
-            back.log_odds().unwrap_or(0.0),
-        );
-        assert!((a - b).abs() < 1e-4, "{a} {b}");
-    }
-}
-
 /// Where a texture was never learned it is as likely as one that the table does not have.
 #[test]
 fn a_texture_never_learned_at_a_movement_is_like_any_other() {
