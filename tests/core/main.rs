@@ -19,6 +19,6 @@ mod played;
 mod presses;
 mod recordings;
 mod refresh;
+mod rigs;
 mod same;
 mod simulated_rig;
-mod training;

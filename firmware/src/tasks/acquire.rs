@@ -2,7 +2,7 @@
 use embassy_time::Timer;
 use heapless::spsc::Producer;
 use tactus_core::sensor::pressure::SLOTS_HZ;
-use tactus_core::wire::{Event, Failure, Reset};
+use tactus_core::wire::{Event, Failure, Reset, text};
 
 use super::outbox::tell;
 use crate::board;
@@ -73,7 +73,7 @@ async fn start(bus: &mut Bus) {
     let mut told = None;
     while let Err(why) = finger::start(bus) {
         if attempts % SAY == 0 || told != Some(why) {
-            tell(Event::Trouble(Failure::Said(why.sentence())));
+            tell(Event::Trouble(Failure::Said(text(why))));
             told = Some(why);
         }
         attempts += 1;

@@ -2,7 +2,7 @@
 //! slide on
 //! the same track again says little about a texture.
 
-use tactus_core::table::{EncodeError, Table, samples_length, with_moved};
+use tactus_core::table::{EncodeError, Table, with_moved};
 
 /// Returns what is true of all of these; `None` where it is not known of one, they differ, or there is none.
 pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
@@ -21,8 +21,8 @@ pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>
     if (0..table.textures()).all(|texture| says(texture) == moved(texture)) {
         return Ok(table.as_bytes().to_vec());
     }
-    let most = table.as_bytes().len() + samples_length(table.textures().into());
-    let mut noted = vec![0; most];
+    // a section of 5 bytes for each texture
+    let mut noted = vec![0; table.as_bytes().len() + 8 + 5 * usize::from(table.textures())];
     let length = with_moved(&mut noted, &table, moved)?.as_bytes().len();
     noted.truncate(length);
     Ok(noted)

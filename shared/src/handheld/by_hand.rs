@@ -53,7 +53,7 @@ pub trait Hand {
         None
     }
 
-    /// Gravity along the finger, counts of P_AC, see [`crate::sensor::PressureSensor::gravity`].
+    /// Gravity along the finger, counts of P_AC, see [`crate::sensor::AnyFinger::gravity`].
     fn gravity(&self) -> Option<f32> {
         None
     }

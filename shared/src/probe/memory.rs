@@ -161,7 +161,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             .as_mut()
             .map_err(|why| MemoryError::Broken(*why))?;
         let finger = self.stored.finger();
-        store.commit_table_of(Some(finger), self.buffer).await?;
+        store.commit_table(Some(finger), self.buffer).await?;
         Ok(())
     }
 

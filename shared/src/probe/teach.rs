@@ -12,7 +12,7 @@ use crate::explorer::EpisodeSummary;
 use crate::features::Vector;
 use crate::store::{SelfLearnedRecord, Store, StoreError};
 use crate::table::Whitened;
-use crate::table::{Change, EncodeError, Known, MAX_MOVEMENTS, Table, Tally, amend, retell};
+use crate::table::{Change, EncodeError, MAX_MOVEMENTS, Table, Tally, TextureStats, amend, retell};
 use crate::table::{MAX_TEXTURES, Name};
 use crate::up_to;
 use crate::wire::{Event, Forget, MemoryError, TextureLearned};
@@ -199,7 +199,7 @@ pub async fn label<F: NorFlash>(
     if known.is_none() {
         delete_stale(base, store).await?;
     }
-    let known_as = Known::Fused(&whitened);
+    let known_as = TextureStats::Fused(&whitened);
     let put = Change::Put {
         name,
         known: known_as,

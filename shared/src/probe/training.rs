@@ -18,7 +18,7 @@ use crate::features::{Movement, Observation, PropertySet};
 use crate::fill;
 use crate::store::TrainingRecord;
 use crate::table::{
-    Change, Contents, Experience, Known, MAX_MOVEMENTS, MAX_TEXTURES, Name, Table, Tally, Texture,
+    Change, Contents, Experience, MAX_MOVEMENTS, MAX_TEXTURES, Name, Table, Tally, TextureStats,
     Whitened, amend, encode, encoded_len,
 };
 use crate::wire::{LEAST_TRIALS, TrainingError};
@@ -300,8 +300,8 @@ impl Training {
             };
         }
         let known = match self.contents {
-            Contents::Gaussians(_) => Known::Gaussians(&experience),
-            Contents::Fused(..) => Known::Fused(&whitened),
+            Contents::Gaussians(_) => TextureStats::Gaussians(&experience),
+            Contents::Fused(..) => TextureStats::Fused(&whitened),
         };
         let name = &self.name;
         match (table, self.contents) {
@@ -312,8 +312,7 @@ impl Training {
             (None, Contents::Gaussians(measured)) => {
                 let movements: Vec<Movement, MAX_MOVEMENTS> =
                     self.learned.iter().map(|(m, _)| *m).collect();
-                let experience = &experience;
-                let texture = Texture { name, experience };
+                let texture = (name.as_str(), &experience[..]);
                 encode(buffer, measured, &movements, [texture].into_iter())
             }
             (None, Contents::Fused(..)) => return Err(TrainingError::Table),

@@ -50,7 +50,7 @@ pub(super) fn may_press(
     let most_counts = model.counts(HIGH_FORCE_LIMIT_MN);
     let counts = finger.force_counts(force_mn);
     force_mn <= most_mn(high_force)
-        && counts.is_ok_and(|counts| force_mn <= HIGH_FORCE_MN || counts < most_counts)
+        && counts.is_some_and(|counts| force_mn <= HIGH_FORCE_MN || counts < most_counts)
 }
 
 /// Faults whose detection is switched off. For tests, which must notice a missing guard.

@@ -4,13 +4,12 @@
 use core::ops::RangeInclusive;
 
 use super::weigh::Still;
-use crate::sensor::PressureSensor as _;
-use crate::sensor::mems::Mems;
+use crate::sensor::mems;
 
 /// Least gravity along a finger that points up or down, counts: one that lies on its side is not measured.
 const LEAST: f32 = 0.7 * COUNTS_PER_G;
 /// Value of a count in the data sheet of the IIS3DWB, mg.
-const MG_PER_COUNT: f32 = Mems::MODEL.calibration.pac_pa_per_count;
+const MG_PER_COUNT: f32 = mems::PARTS.model.calibration.pac_pa_per_count;
 const COUNTS_PER_G: f32 = 1e3 / MG_PER_COUNT;
 /// Plausible values of a count, mg: within a tenth of the data sheet's (chosen, since its own limits could not be
 /// read). A finger that is turned over 15 degrees askew shows 3 % less.
@@ -29,7 +28,7 @@ impl Turning {
         self.first.is_some()
     }
 
-    /// Takes gravity along the finger, counts of P_AC ([`crate::sensor::PressureSensor::gravity`]),
+    /// Takes gravity along the finger, counts of P_AC ([`crate::sensor::AnyFinger::gravity`]),
     /// [`LOOKS_HZ`](super::weigh::LOOKS_HZ) times a second. Both ways, once it has been still in each.
     pub(crate) fn take(&mut self, counts: f32) -> Option<Turned> {
         let mean = self.still.take(counts)?;

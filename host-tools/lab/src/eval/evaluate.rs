@@ -163,9 +163,6 @@ pub fn play_with<const N: usize>(
 
 /// Plays `runs` runs on all cores; `done` is called after each. The outcomes are in the order of the runs, and the same
 /// for any number of threads.
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn evaluate(
     experiment: &Experiment,
     config: Config,
@@ -224,9 +221,7 @@ pub(super) fn evaluate_by<T: Send>(
 }
 
 /// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
-///
-/// # Errors
-/// The table does not read, or cannot be explored.
+/// Errors: the table does not read, or cannot be explored.
 #[inline(never)]
 pub fn explorer<'b>(
     bytes: &'b [u8],

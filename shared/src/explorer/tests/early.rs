@@ -171,7 +171,7 @@ fn nobody_looks_where_a_length_is_not_known_of_all() {
     let new = textures(1.0).remove(2);
     let put = crate::table::Change::Put {
         name: "new",
-        known: crate::table::Known::Fused(&new),
+        known: crate::table::TextureStats::Fused(&new),
         tally: crate::table::Tally::default(),
     };
     let mut out = vec![0; 20_000];

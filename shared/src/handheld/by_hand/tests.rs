@@ -129,7 +129,7 @@ impl Hand for Obedient {
         };
         Some(Some(Pressure {
             channel,
-            counts: Counts::saturating(value),
+            counts: Counts::from_low_bits(value.round().clamp(0.0, 4095.0) as u16),
         }))
     }
 

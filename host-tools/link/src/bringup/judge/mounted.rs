@@ -3,8 +3,7 @@
 use tactus_core::features::Movement;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::unloaded::SPEEDS_UM_S;
-use tactus_core::sensor::PressureSensor;
-use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::biotac;
 use tactus_core::sensor::pressure::Calibration;
 use tactus_core::wire::bringup::limits::SQUEEZED_MN;
 use tactus_core::wire::{Counts, Live, SlideReport};
@@ -49,7 +48,7 @@ pub fn scale(points: &[[f64; 2]], held: f32, after: f32) -> Finding {
         .map(|[counts, mn]| (*counts as f32, *mn as f32))
         .collect();
     let most = points.iter().map(|(counts, _)| *counts).fold(0.0, f32::max);
-    let dead = most < BioTac::MODEL.counts(SQUEEZED_MN);
+    let dead = most < biotac::PARTS.model.counts(SQUEEZED_MN);
     let leaks = !dead && (held < -AIR_COUNTS || after.abs() > AIR_COUNTS);
     let line = weights::line(&points);
     let (said, uneven, far) = match &line {
