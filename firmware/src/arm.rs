@@ -3,7 +3,7 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us | words to `arm` |
-//! | UART5's interrupt, woken by the clock's | `arm` | the rig over the link, guard, line of permission and watchdog, 1 kHz | samples to `probe`, orders to `orders`, a snapshot to all |
+//! | UART5's interrupt | `arm` | rig, guard, permission and watchdog, 1 kHz | samples to `probe`, orders, a snapshot |
 //! | thread mode | `probe` | explorations, training, tables; owns the store | commands to `arm`, reports to `send` |
 //! | thread mode | `acquire` | starts the slots when the sensor is ready | |
 //! | thread mode | `watch` | phases, faults and force as they change | reports to `send` |

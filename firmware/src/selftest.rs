@@ -1,6 +1,6 @@
 //! The other end of `tactus device bringup`: it asks for one measurement after the other and judges them. Here is only
-//! measured, and motors move only after somebody has squeezed the finger in the hand, within the bounds of [`Motors`]. Whatever
-//! comes while one moves stops it.
+//! measured, and motors move only after somebody has squeezed the finger in the hand, within the bounds of [`Motors`].
+//! Whatever comes while one moves stops it.
 use core::future::Future;
 use core::sync::atomic::Ordering::Relaxed;
 

@@ -1,5 +1,6 @@
-//! What a probe does when it is asked, the same on the chip, on the emulated board and in a PC's simulated probe: requests
-//! come to [`receive`], those that wait for their turn go to [`Probe::serve`]. What a probe runs on is behind [`seams`].
+//! What a probe does when it is asked, the same on the chip, on the emulated board and in a PC's simulated probe:
+//! requests come to [`receive`], those that wait for their turn go to [`Probe::serve`]. What a probe runs on is behind
+//! [`seams`].
 
 pub(crate) mod calibrate;
 mod dispatch;

@@ -1,5 +1,5 @@
-//! What `cargo xtask bench` counts: the core's functions as the rig calls them, on what the host gives. The emulator's bench
-//! compiles this file too and runs the same with the plain kernels; results must be equal to the bit.
+//! What `cargo xtask bench` counts: the core's functions as the rig calls them, on what the host gives. The emulator's
+//! bench compiles this file too and runs the same with the plain kernels; results must be equal to the bit.
 
 use core::hint::black_box;
 
@@ -130,8 +130,8 @@ impl ObservedSlide {
     }
 }
 
-/// Runs a workload on the samples or the observed slide in `words`, which the background precedes, and writes its results;
-/// `None` if the words make no sense.
+/// Runs a workload on the samples or the observed slide in `words`, which the background precedes, and writes its
+/// results; `None` if the words make no sense.
 pub fn run(
     workload: Workload,
     plan: &Plan,

@@ -1,8 +1,8 @@
-//! The current of the stage's motor. It swings with every period of the motor's PWM, by up to 0.2 A, so that a single reading says
-//! little. ADC1 converts without pause, DMA2 writes what it finds to a ring, and the ring's mean is taken over whole periods
-//! of the PWM, at evenly spread places within them. This module owns the converter and the stream: embassy's ring-buffered
-//! driver takes an interrupt for each half of the ring, panics there on a bus error, and does not look for an overrun, after
-//! which nothing comes any more.
+//! The current of the stage's motor. It swings with every period of the motor's PWM, by up to 0.2 A, so that a single
+//! reading says little. ADC1 converts without pause, DMA2 writes what it finds to a ring, and the ring's mean is taken
+//! over whole periods of the PWM, at evenly spread places within them. This module owns the converter and the stream:
+//! embassy's ring-buffered driver takes an interrupt for each half of the ring, panics there on a bus error, and does
+//! not look for an overrun, after which nothing comes any more.
 use core::mem::ManuallyDrop;
 use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
 
@@ -48,14 +48,14 @@ pub(crate) const RING_MS: u64 = 2;
 const CHANNEL: u8 = 3;
 /// Of DMA2, which carries ADC1 on its channel 0 (RM0090, table 44).
 const STREAM: usize = 0;
-/// The converter is steady 3 us after it is switched on (data sheet, t_STAB): twice that, since the emulated core makes a loop
-/// of so many cycles in fewer instructions.
+/// The converter is steady 3 us after it is switched on (data sheet, t_STAB): twice that, since the emulated core makes
+/// a loop of so many cycles in fewer instructions.
 const STEADY_CYCLES: u32 = 2 * 3 * 168;
 /// A stream that is switched off ends the transfer under way first; looks at that, each longer than a transfer.
 const LOOKS: u32 = 20;
 
-/// What was converted last, in no order that matters: each new conversion is at the place in the PWM's period of the one
-/// whose room it takes.
+/// What was converted last, in no order that matters: each new conversion is at the place in the PWM's period of the
+/// one whose room it takes.
 static RING: [AtomicU16; CONVERSIONS] = [const { AtomicU16::new(0) }; CONVERSIONS];
 
 pub(crate) struct Current {
@@ -84,8 +84,8 @@ impl Current {
         converter
     }
 
-    /// The conversions of the last whole periods; `None` if there are none since the last look, or not yet as many. What stands
-    /// still is started anew.
+    /// The conversions of the last whole periods; `None` if there are none since the last look, or not yet as many.
+    /// What stands still is started anew.
     pub(crate) fn ring(&mut self) -> Option<impl Iterator<Item = u16>> {
         let stream = DMA2.st(STREAM);
         let left = stream.ndtr().read().ndt();
@@ -116,8 +116,8 @@ impl Current {
         Some(amperes(sum as f32 / CONVERSIONS as f32))
     }
 
-    /// Starts converter and stream from the beginning, whatever has become of them. Bounded: a stream that does not stop is left
-    /// to itself, and the next look finds that it does not go on.
+    /// Starts converter and stream from the beginning, whatever has become of them. Bounded: a stream that does not
+    /// stop is left to itself, and the next look finds that it does not go on.
     fn start(&mut self) {
         // no conversion under way, no request
         ADC1.cr2().write(|_| ());

@@ -297,7 +297,8 @@ fn fold_frame<'r>(
             end = in(reg) begin.add(FRAME / 4),
             a = out(reg) _, b = out(reg) _, c = out(reg) _, d = out(reg) _, x = out(reg) _,
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _,
+            out("s15") _,
             out("s16") _, out("s17") _, out("s18") _, out("s19") _,
             options(nostack),
         );
@@ -355,7 +356,8 @@ unsafe fn fold_fours(
             even = inout(reg) folded.add(half) => _,
             end = in(reg) folded.add(half),
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _,
+            out("s15") _,
             out("s16") _, out("s17") _, out("s18") _, out("s19") _,
             options(nostack),
         );
@@ -397,8 +399,10 @@ unsafe fn add_power_eights(bins: *const Complex32, sums: *mut f32, many: usize) 
             sums = inout(reg) sums => _,
             end = in(reg) sums.add(many),
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
-            out("s16") _, out("s17") _, out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _,
+            out("s15") _,
+            out("s16") _, out("s17") _, out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _,
+            out("s23") _,
             options(nostack),
         );
     }

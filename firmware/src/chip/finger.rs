@@ -1,5 +1,5 @@
-//! The finger that is on the sensor's bus: looked for when the chip starts, before anything needs to know it. Every task that does
-//! waits for [`found`].
+//! The finger that is on the sensor's bus: looked for when the chip starts, before anything needs to know it. Every
+//! task that does waits for [`found`].
 use core::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
 use cortex_m::peripheral::SCB;
@@ -73,8 +73,8 @@ pub(crate) async fn find_at_boot(bus: &mut Bus, reset: Reset) -> bool {
     finger.is_some()
 }
 
-/// Looks again, where there was nothing: whether it is there now. All that was begun is for the finger of this start, so that another
-/// one starts the chip anew; the lever's first act is then to lift.
+/// Looks again, where there was nothing: whether it is there now. All that was begun is for the finger of this start,
+/// so that another one starts the chip anew; the lever's first act is then to lift.
 pub(crate) fn find_again(bus: &mut Bus) -> bool {
     match look(bus) {
         None => false,

@@ -42,8 +42,8 @@ pub(crate) async fn open(flash: board::Storage) -> Result<Storage, StoreError> {
 }
 
 /// Waits for a store that is being opened; `progress` is called at every look. An erase under way must not be dropped:
-/// embassy's driver would lock the flash then, and a write to its control register has the core stand until the flash is ready
-/// (RM0090 3.6.1).
+/// embassy's driver would lock the flash then, and a write to its control register has the core stand until the flash
+/// is ready (RM0090 3.6.1).
 ///
 /// # Errors
 /// It cannot be opened, or the flash says nothing for 10 s.
@@ -52,7 +52,8 @@ pub(crate) async fn wait(
     progress: impl Fn(),
 ) -> Result<Storage, StoreError> {
     let mut opening = ManuallyDrop::new(opening);
-    // SAFETY: it stays where it is while it is polled. Given up, nothing refers to it: the driver keeps a waker of the task.
+    // SAFETY: it stays where it is while it is polled. Given up, nothing refers to it: the driver keeps a waker of the
+    // task.
     let mut opening = unsafe { Pin::new_unchecked(&mut *opening) };
     for _ in 0..LOOKS {
         progress();
@@ -73,8 +74,8 @@ impl StoredBytes<Bank2> for MappedTable {
     fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {
         let table = store.table()?;
         let at = table.offset as usize;
-        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only when
-        // the one after next is begun, and no reader of this slice lives that long.
+        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only
+        // when the one after next is begun, and no reader of this slice lives that long.
         let store = unsafe { core::slice::from_raw_parts(STORE_AT as *const u8, STORE_LENGTH) };
         store.get(at..at.checked_add(table.length)?)
     }

@@ -1,4 +1,5 @@
-//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say. This module owns the timer.
+//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say. This module owns the
+//! timer.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicI32, AtomicU32, Ordering::Relaxed};
 
@@ -70,8 +71,8 @@ impl Lever {
         MADE.load(Relaxed)
     }
 
-    /// Gives the motor current, or takes it away, and steps at this rate from the next period on; 10 ms after it got current
-    /// at the earliest, for which this is to be called again.
+    /// Gives the motor current, or takes it away, and steps at this rate from the next period on; 10 ms after it got
+    /// current at the earliest, for which this is to be called again.
     pub(crate) fn drive(&mut self, enabled: bool, rate: i32) {
         if enabled && self.enable.is_set_low() {
             self.enabled = Instant::now();
@@ -126,8 +127,8 @@ pub(crate) fn slow_clock() {
     REGISTERS.egr().write(|w| w.set_ug(true));
 }
 
-/// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made. For
-/// when nothing else works any more.
+/// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made.
+/// For when nothing else works any more.
 pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     REGISTERS.dier().write(|w| w.set_uie(false));
     REGISTERS.ccr(0).write(|w| w.set_ccr(0));

@@ -1,7 +1,7 @@
 //! The bus of the handheld's sensor of motion: SPI4 with its pins and its chip select, which this module owns wholly.
 //!
-//! A reading takes 0.15 ms of each 10 ms, and the start-up list 2 ms at once: its task waits for the bytes, and everything that is
-//! urgent interrupts it.
+//! A reading takes 0.15 ms of each 10 ms, and the start-up list 2 ms at once: its task waits for the bytes, and
+//! everything that is urgent interrupts it.
 use core::mem::ManuallyDrop;
 
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};

@@ -7,8 +7,8 @@ use tactus_core::sensor::{FingerName, FingerParts, SLOWEST_HZ};
 pub(super) const TIMER_HZ: u32 = 84_000_000;
 /// Ticks of the timer in a us; the core makes two cycles in each.
 const US_TICKS: u32 = TIMER_HZ / 1_000_000;
-/// A transaction may end so much later than its bytes take, us: by other interrupts, and while they are off. Later, it would
-/// leave less than the gap before the next one, or its sample would not be where it should be in time.
+/// A transaction may end so much later than its bytes take, us: by other interrupts, and while they are off. Later, it
+/// would leave less than the gap before the next one, or its sample would not be where it should be in time.
 const SLACK_US: u32 = 7;
 pub(super) const SELECTS: usize = 2;
 
@@ -163,8 +163,8 @@ impl Plan {
     }
 }
 
-/// The transactions of each slot of each finger, in RAM: without the data cache (see `board`) each constant that is read
-/// from flash takes six cycles more, and a slot reads twenty of them. Board tests look for this name.
+/// The transactions of each slot of each finger, in RAM: without the data cache (see `board`) each constant that is
+/// read from flash takes six cycles more, and a slot reads twenty of them. Board tests look for this name.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".data.SLOT_PLAN")]
 pub(super) static SLOT_PLAN: [Plan; FingerName::ALL.len()] = [

@@ -1,9 +1,9 @@
 //! The sensor's slots: SPI1 with its pins, the chip selects, and the timer TIM2, which this module owns wholly.
 //!
-//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`FingerParts::slots`]): the timer's interrupts
-//! begin a transaction, the bus's interrupt ends each of its frames, and nobody waits for either. What does not end in its time
-//! is given up when the timer comes next. embassy's driver of the bus has no transfers by its interrupt: it spins for each
-//! byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
+//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`FingerParts::slots`]): the timer's
+//! interrupts begin a transaction, the bus's interrupt ends each of its frames, and nobody waits for either. What does
+//! not end in its time is given up when the timer comes next. embassy's driver of the bus has no transfers by its
+//! interrupt: it spins for each byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
 use core::cell::UnsafeCell;
 use core::mem::ManuallyDrop;
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
@@ -109,7 +109,8 @@ impl Bus {
         self.set_clock(plan.clock);
     }
 
-    /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no word.
+    /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no
+    /// word.
     fn restart(&mut self) {
         for select in &self.selects {
             select.set(false);
@@ -133,8 +134,8 @@ impl Bus {
             .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
     }
 
-    /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes the place of
-    /// `bytes`.
+    /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes
+    /// the place of `bytes`.
     pub(crate) fn transact(
         &mut self,
         port: Option<&Port>,
@@ -188,8 +189,8 @@ struct Slots {
 
 struct Shared(UnsafeCell<Option<Slots>>);
 
-// SAFETY: written once, before either interrupt is enabled. Afterwards the handlers of the two alone use it, which have one
-// priority: neither interrupts the other.
+// SAFETY: written once, before either interrupt is enabled. Afterwards the handlers of the two alone use it, which have
+// one priority: neither interrupts the other.
 unsafe impl Sync for Shared {}
 
 static SHARED: Shared = Shared(UnsafeCell::new(None));

@@ -4,8 +4,8 @@ use core::arch::global_asm;
 
 use tactus_core::dsp::{Angles, Complex32, FRAME, Reals};
 
-// microfft's transform (decimation in time), two of its stages at a time and the first two or three together: the same products
-// and sums, each rounded, with half of the loads and stores.
+// microfft's transform (decimation in time), two of its stages at a time and the first two or three together: the same
+// products and sums, each rounded, with half of the loads and stores.
 global_asm!(
     ".fpu fpv4-sp-d16",
     // b, turned by an angle, added to a and subtracted from it
@@ -219,7 +219,8 @@ unsafe extern "C" {
     );
 }
 
-/// The places of `N` values, a power of 2, whose bits are another's when reversed: pairs that a transform begins by swapping.
+/// The places of `N` values, a power of 2, whose bits are another's when reversed: pairs that a transform begins by
+/// swapping.
 #[expect(
     clippy::indexing_slicing,
     reason = "the compiler runs it, and has no iterators"

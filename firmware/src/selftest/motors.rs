@@ -1,5 +1,5 @@
-//! Lever, stage, switches and current amplifier, used directly. Each move ends at a bound, at the emergency stop, at a limit switch
-//! and, of the lever, when P_DC rises; with it the motor stands.
+//! Lever, stage, switches and current amplifier, used directly. Each move ends at a bound, at the emergency stop, at a
+//! limit switch and, of the lever, when P_DC rises; with it the motor stands.
 use embassy_time::Timer;
 use heapless::Vec;
 use tactus_core::rig::lever::{MAX_STEPS, RETRACT_STEPS_S};

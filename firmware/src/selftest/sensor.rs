@@ -1,4 +1,5 @@
-//! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches it.
+//! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches
+//! it.
 use embassy_time::{Duration, Instant, Timer};
 use tactus_core::sensor::biotac::{IdentityBytes, keep};
 use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};

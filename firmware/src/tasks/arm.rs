@@ -1,5 +1,5 @@
-//! A thousand times a second: the sensor's words and what the arm said into [`RigOverLink`], its orders on their way to the arm, and the
-//! samples of the slide on their way to the features. The guard lives in the core.
+//! A thousand times a second: the sensor's words and what the arm said into [`RigOverLink`], its orders on their way to
+//! the arm, and the samples of the slide on their way to the features. The guard lives in the core.
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::gpio::{Level, Output, Speed};

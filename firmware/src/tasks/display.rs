@@ -20,12 +20,12 @@ bind_interrupts!(struct Irqs {
 
 /// Whether [`NEXT`] is to be shown, or the display is to be off.
 static SHOW: Signal<CriticalSectionRawMutex, bool> = Signal::new();
-/// What is to be shown next. It is copied with interrupts on: a signal would move its 1 KB with them off, and for longer
-/// than a sensor slot may be late.
+/// What is to be shown next. It is copied with interrupts on: a signal would move its 1 KB with them off, and for
+/// longer than a sensor slot may be late.
 static NEXT: Mutex<CriticalSectionRawMutex, Picture> = Mutex::new(Picture::new());
 
-/// Has a picture shown; `None` switches the display off. A picture that comes too early takes the place of the one before
-/// it.
+/// Has a picture shown; `None` switches the display off. A picture that comes too early takes the place of the one
+/// before it.
 pub(crate) fn picture(picture: Option<&Picture>) {
     if let Some(picture) = picture {
         // who shows it copies it at once, and runs where those run who call this: nobody else has it now

@@ -63,8 +63,8 @@ pub(crate) const fn unmeasured(finger: FingerName) -> RigCalibration {
     RigCalibration::unmeasured(&finger.parts().model)
 }
 
-/// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid, is
-/// half of it.
+/// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid,
+/// is half of it.
 const HUNG_MS: u32 = 2000;
 /// A session without progress for longer waits for something that does not come, such as an interrupt of the flash. All
 /// that it does without the rig, the sectors of the store erased and written, takes less than 15 s.
@@ -93,7 +93,8 @@ pub(crate) fn waits() {
     STUCK_MS.store(WAITS, Relaxed);
 }
 
-/// Another millisecond: why the tasks that the rig serves are taken for hung, if they are. Board tests break it by its name.
+/// Another millisecond: why the tasks that the rig serves are taken for hung, if they are. Board tests break it by its
+/// name.
 #[unsafe(export_name = "tactus_servo_tick")]
 #[inline(never)]
 fn hung() -> Option<&'static str> {

@@ -37,8 +37,8 @@ use crate::chip::{KERNELS, finger};
 
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
-/// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest sector,
-/// 2 s, and to write 64 KB, 1.6 s.
+/// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest
+/// sector, 2 s, and to write 64 KB, 1.6 s.
 const PATIENCE_MS: u32 = 10_000;
 
 static ASLEEP_US: AtomicU32 = AtomicU32::new(0);

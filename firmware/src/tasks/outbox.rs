@@ -26,8 +26,8 @@ pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
     });
 }
 
-/// Sends an event to the host. An event that does not fit into the outbox is dropped and counted; it leaves a gap in the
-/// numbers.
+/// Sends an event to the host. An event that does not fit into the outbox is dropped and counted; it leaves a gap in
+/// the numbers.
 pub(crate) fn tell(event: Event) {
     let report = Report {
         number: NUMBER.fetch_add(1, Relaxed),

@@ -36,14 +36,15 @@ pub(crate) async fn probe(
     finger::found().await;
     let flaw = || board::flaw()?.try_into().ok();
     outbox::booted(reset, last_words.or_else(flaw));
-    // textures of a simulated world, which suit the emulated board; a real rig is trained by its user, or receives a table
+    // textures of a simulated world, which suit the emulated board; a real rig is trained by its user, or receives a
+    // table
     let table = if has_stage {
         factory::rig(finger::name())
     } else {
         factory::arm(finger::name())
     };
-    // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does not
-    // move before the calibration is there, which says whether the finger is in the air.
+    // Whatever was before the reset, the finger is lifted first, and waits for nothing but the sensor. The stage does
+    // not move before the calibration is there, which says whether the finger is in the air.
     Timer::after_millis(HEARD_MS).await;
     // An arm is told to stop, and asked for more once somebody asks for a slide: it may not be there.
     let lifted = !has_stage || rig.lift().await.is_ok();

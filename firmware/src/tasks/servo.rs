@@ -1,5 +1,5 @@
-//! A thousand times a second: the pins into [`Control`], what it says to the pins, and the samples of the slide on their
-//! way to the features. Lever, stage and guard live in the core; here is only where their pins are.
+//! A thousand times a second: the pins into [`Control`], what it says to the pins, and the samples of the slide on
+//! their way to the features. Lever, stage and guard live in the core; here is only where their pins are.
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_stm32::Peri;

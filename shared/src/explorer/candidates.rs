@@ -31,7 +31,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         Ok(explorer)
     }
 
-    /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold twice.
+    /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold
+    /// twice.
     pub(crate) fn consider(
         &mut self,
         measured: PropertySet,

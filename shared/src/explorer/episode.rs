@@ -79,7 +79,7 @@ pub struct EpisodeSummary {
     pub certain: bool,
     /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
     pub observed: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
-    /// At each of these the mean of ln(speed) in parts of the movement's, 1/1024; where it is not known that of a usual one. 0 with
-    /// a table that knows no speeds.
+    /// At each of these the mean of ln(speed) in parts of the movement's, 1/1024; where it is not known that of a usual
+    /// one. 0 with a table that knows no speeds.
     pub paces: Vec<i16, MAX_MOVEMENTS>,
 }

@@ -1,9 +1,10 @@
-//! The fused way of deciding where the table knows how its means go with the speed: each mean is moved to the speed of the
-//! slides, and a slide of unknown speed is one of any.
+//! The fused way of deciding where the table knows how its means go with the speed: each mean is moved to the speed of
+//! the slides, and a slide of unknown speed is one of any.
 //!
 //! Slides of an episode at a movement have the mean m + B u, with the slope B of the texture and the mean u of their
-//! ln(speed). Of u a part may be unknown: with its variance p the covariance V of the mean grows by p B B'. By Sherman and Morrison
-//! the squared distance r' V^-1 r then falls by p (r' V^-1 B)^2 / (1 + p B' V^-1 B), and ln |V| grows by ln(1 + p B' V^-1 B).
+//! ln(speed). Of u a part may be unknown: with its variance p the covariance V of the mean grows by p B B'. By Sherman
+//! and Morrison the squared distance r' V^-1 r then falls by p (r' V^-1 B)^2 / (1 + p B' V^-1 B), and ln |V| grows by
+//! ln(1 + p B' V^-1 B).
 
 use super::episode::MovementSums;
 use crate::dsp::fixed::ln_q16;
@@ -41,8 +42,8 @@ impl MovementSums {
 }
 
 impl Pace<'_> {
-    /// An eighth of the squared distance of a mean of slides from that of a texture, with a weight for each two numbers,
-    /// and by what half the logarithm of the determinant of the covariance grows: both in Q16.
+    /// An eighth of the squared distance of a mean of slides from that of a texture, with a weight for each two
+    /// numbers, and by what half the logarithm of the determinant of the covariance grows: both in Q16.
     pub(super) fn distance(
         &self,
         texture: usize,

@@ -96,8 +96,8 @@ impl Student {
     }
 }
 
-/// ln Gamma(x + 1/2) - ln Gamma(x): the recurrence up to 6, then the asymptotic series. The difference of the two would lose
-/// digits, and the chip 1.5 KB.
+/// ln Gamma(x + 1/2) - ln Gamma(x): the recurrence up to 6, then the asymptotic series. The difference of the two would
+/// lose digits, and the chip 1.5 KB.
 fn ln_gamma_step(mut x: f32) -> f32 {
     let mut ratio = 1.0;
     while x < 6.0 {

@@ -68,9 +68,9 @@ pub(super) fn add_likelihoods(
     Some((elsewhere, can_tell))
 }
 
-/// [`add_likelihoods`] of an episode of several movements, or with slopes ([`Pace`](super::paced::Pace)): the squared distances of all
-/// movements have one Student's t. A movement at which a texture was never measured is for it as for a texture that the
-/// table does not have.
+/// [`add_likelihoods`] of an episode of several movements, or with slopes ([`Pace`](super::paced::Pace)): the squared
+/// distances of all movements have one Student's t. A movement at which a texture was never measured is for it as for a
+/// texture that the table does not have.
 #[inline(never)]
 fn add_jointly(
     table: &Table<'_>,

@@ -83,9 +83,7 @@ pub enum JudgeError {
 /// Compares the slides of an episode with every texture of the table, or with `reference` alone: is it that one?
 /// Returns the judgement to show and the summary that the probe can learn from. The share of false alarms is the
 /// table's own, unless given.
-///
-/// # Errors
-/// The table is not one for a handheld probe, or a slide lacks a feature.
+/// Errors: the table is not one for a handheld probe, or a slide lacks a feature.
 pub fn judge(
     table: Table<'_>,
     slides: &[Observation],

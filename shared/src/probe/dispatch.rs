@@ -1,5 +1,5 @@
-//! Every request, once: what is answered at any time, what waits for its turn, what is refused because the probe is busy;
-//! and what is done when its turn has come.
+//! Every request, once: what is answered at any time, what waits for its turn, what is refused because the probe is
+//! busy; and what is done when its turn has come.
 
 use core::pin::pin;
 

@@ -82,8 +82,8 @@ impl From<ExploreError<RigError>> for Failure {
     }
 }
 
-/// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another movement
-/// is chosen; only a rig that cannot go on ends it, with what is known so far. `random` serves
+/// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another
+/// movement is chosen; only a rig that cannot go on ends it, with what is known so far. `random` serves
 /// [`crate::explorer::Strategy::Random`]; `tell` receives every step.
 pub async fn explore<R: Rig, const N: usize>(
     rig: &mut R,

@@ -1,5 +1,5 @@
-//! An exploration that a host asks for, from beginning to end: every step is told in the words of [`crate::wire`], so that
-//! the host can follow each decision.
+//! An exploration that a host asks for, from beginning to end: every step is told in the words of [`crate::wire`], so
+//! that the host can follow each decision.
 
 use heapless::Vec;
 
@@ -26,9 +26,8 @@ pub struct Identification {
 
 /// Explores what lies under the finger until there is an answer, and reports it. `config` is that of the request, with
 /// what the probe adds to it; where it is to [verify](Config::verify), [`Event::Verified`] takes the verdict's place.
-///
-/// # Errors
-/// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
+/// Errors: the request makes no sense with this table, or the exploration failed: see
+/// [`crate::probe::explore::ExploreError`].
 pub async fn identify<R>(
     wanted: &Identify,
     config: Config,

@@ -19,8 +19,8 @@ pub struct Memory<'m, F, B> {
     store: Result<Store<F>, StoreError>,
     stored: B,
     factory: &'m [u8],
-    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
-    /// table is made here too; afterwards [`Memory::reload`] is due.
+    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A
+    /// new table is made here too; afterwards [`Memory::reload`] is due.
     buffer: &'m mut [u8],
     length: Result<usize, MemoryError>,
     is_factory: bool,
@@ -172,8 +172,8 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns from an exploration that the probe is certain of, and reports it. If that fails, the answer of the exploration
-    /// still stands.
+    /// Learns from an exploration that the probe is certain of, and reports it. If that fails, the answer of the
+    /// exploration still stands.
     pub(super) async fn learn_by_itself(
         &mut self,
         episode: &EpisodeSummary,
@@ -195,11 +195,9 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns the slides of the last exploration under the user's label, puts the new table in force and reports it. After
-    /// an error the exploration can be labelled again, with another name.
-    ///
-    /// # Errors
-    /// The rig has moved since the exploration; those of [`teach::label`].
+    /// Learns the slides of the last exploration under the user's label, puts the new table in force and reports it.
+    /// After an error the exploration can be labelled again, with another name. Errors: the rig has moved since the
+    /// exploration; those of [`teach::label`].
     pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), MemoryError> {
         let episode = self.episode.take().ok_or(MemoryError::NoEpisode)?;
         let (store, base, buffer) = self.lend()?;

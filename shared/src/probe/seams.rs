@@ -42,9 +42,7 @@ pub trait RigHandle: Rig<Error = RigError> {
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
     /// Allows movements of up to 2 N, or forbids them. What the store cannot keep is not allowed.
-    ///
-    /// # Errors
-    /// [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
+    /// Errors: [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
     async fn set_high_force<F: NorFlash>(
         &mut self,
         _allow: bool,
@@ -59,28 +57,23 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// Goes on from this wear of the skin.
     async fn set_skin(&mut self, skin: SkinCare);
 
-    /// Measures what a rig can measure of itself, and uses it from now on: with motors their current without load and P_DC in
-    /// the air, in a hand P_DC in the air.
-    ///
-    /// # Errors
-    /// It was not measured; the constants are those of before.
+    /// Measures what a rig can measure of itself, and uses it from now on: with motors their current without load and
+    /// P_DC in the air, in a hand P_DC in the air. Errors: it was not measured; the constants are those of before.
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure>;
 
-    /// Measures P_DC under a weight of so many mN that a person puts on the lifted finger, in counts above that in the air; below
-    /// 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
+    /// Measures P_DC under a weight of so many mN that a person puts on the lifted finger, in counts above that in the
+    /// air; below 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure>;
 
     /// Measures gravity along the finger, which a person turns over.
-    ///
-    /// # Errors
-    /// Nobody turned it over. [`Failure::OtherProbe`]: it has no accelerometer.
+    /// Errors: nobody turned it over. [`Failure::OtherProbe`]: it has no accelerometer.
     async fn turn_over(&mut self) -> Result<Turned, Failure> {
         Err(Failure::OtherProbe)
     }
 }
 
-/// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside
-/// the store that they came from, for a new table is written while the old one is read.
+/// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable
+/// beside the store that they came from, for a new table is written while the old one is read.
 pub trait StoredBytes<F: NorFlash> {
     /// The bytes of [`Store::table`]; `None` if no table is stored, or if it cannot be read.
     fn bytes(&mut self, store: &mut Store<F>) -> Option<&[u8]>;

@@ -24,7 +24,8 @@ use crate::wire::{Event, Failure, MemoryError, Prompt};
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
 const _: () = assert!(LOOK_MS * LOOKS_HZ == 1000);
-/// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight turns, too.
+/// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight
+/// turns, too.
 const TURNED_MN: u16 = 1000;
 /// A weight is waited for as long, looks.
 const PATIENCE: u32 = 60 * LOOKS_HZ;
@@ -280,7 +281,8 @@ impl<S: Servo> ServoRig<S> {
         self.rest().await.map(|_| ())
     }
 
-    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is done.
+    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is
+    /// done.
     async fn with_person(&mut self, mn: u16, asked: &mut PersonTask) -> Result<(), RigError> {
         if self.rest().await?.phase == Phase::Parked {
             self.home().await?;

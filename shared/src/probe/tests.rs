@@ -142,7 +142,8 @@ fn random_numbers_are_spread() {
     }
 }
 
-/// Four textures whose tractions lie ten standard deviations apart; the third one's bands are those of the script's slides.
+/// Four textures whose tractions lie ten standard deviations apart; the third one's bands are those of the script's
+/// slides.
 fn fused_table() -> vec::Vec<u8> {
     let bands = {
         let plan = Plan::new();

@@ -14,13 +14,10 @@ use crate::table::{MAX_MOVEMENTS, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Rejection, Train};
 
-/// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
-/// is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a whole table.
-///
-/// # Errors
-/// The texture cannot be learned, see [`crate::wire::TrainingError`]; the rig does not press as hard as one of the movements;
-/// the rig or the store failed;
-/// [`MAX_REJECTED`] slides in a row were no good.
+/// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every
+/// trial is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a
+/// whole table. Errors: the texture cannot be learned, see [`crate::wire::TrainingError`]; the rig does not press as
+/// hard as one of the movements; the rig or the store failed; [`MAX_REJECTED`] slides in a row were no good.
 pub async fn train<R, F>(
     wanted: &Train,
     rig: &mut R,

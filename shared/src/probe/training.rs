@@ -1,15 +1,15 @@
 //! Learning a texture by touching it: which movement comes next, what its slide adds, and the table in the end.
 //!
-//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide; a
-//! training begun anew with the same name and table goes on where it stood when it is given them back:
+//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide;
+//! a training begun anew with the same name and table goes on where it stood when it is given them back:
 //!
 //! ```text
 //! new -> resume per stored movement -> [ next -> slide -> took -> store ]* -> encode -> commit the table -> delete
 //! ```
 //!
-//! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has, so
-//! what it learns does not go into that table: its result is stored and reported. It makes a table only where there is none,
-//! with the pilot's movements, or where the table has these already.
+//! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has,
+//! so what it learns does not go into that table: its result is stored and reported. It makes a table only where there
+//! is none, with the pilot's movements, or where the table has these already.
 
 use crate::table::TrainingStats;
 use heapless::Vec;
@@ -92,9 +92,7 @@ impl Training {
     /// Begins a training, or begins it again; `table` is the one in use, `buffer` the bytes that a table may have.
     ///
     /// Without a table its movements are [`FIRST_MOVEMENTS`], or the pilot's.
-    ///
-    /// # Errors
-    /// Everything that would keep the texture out of the table in the end: see [`TrainingError`].
+    /// Errors: everything that would keep the texture out of the table in the end: see [`TrainingError`].
     #[inline]
     pub fn new(
         wanted: Wanted<'_>,
@@ -175,8 +173,8 @@ impl Training {
         &self.name
     }
 
-    /// The checksum under which progress is stored: of the table whose trials of this texture are counted in, `None` where
-    /// there are none.
+    /// The checksum under which progress is stored: of the table whose trials of this texture are counted in, `None`
+    /// where there are none.
     pub fn table(&self) -> Option<u32> {
         self.table.filter(|_| self.goes_on)
     }
@@ -192,9 +190,7 @@ impl Training {
     }
 
     /// Takes up what was stored of this training at a movement.
-    ///
-    /// # Errors
-    /// [`TrainingError::Movement`], [`TrainingError::Stats`].
+    /// Errors: [`TrainingError::Movement`], [`TrainingError::Stats`].
     #[inline]
     pub fn resume(
         &mut self,
@@ -214,8 +210,8 @@ impl Training {
         Ok(())
     }
 
-    /// The movement to be made next: the one made least often, of several the first; `None` when there are enough trials of
-    /// all.
+    /// The movement to be made next: the one made least often, of several the first; `None` when there are enough
+    /// trials of all.
     pub fn next(&self) -> Option<Movement> {
         let (movement, experience) = self.learned.iter().min_by_key(|(_, e)| e.trials())?;
         (experience.trials() < self.trials).then_some(*movement)
@@ -229,9 +225,7 @@ impl Training {
             .sum()
     }
 
-    /// Takes a slide in, and gives what is to be stored. `table` is the one that the training was begun with.
-    ///
-    /// # Errors
+    /// Takes a slide in, and gives what is to be stored. `table` is the one that the training was begun with. Errors:
     /// [`TrainingError::Movement`], [`TrainingError::Missing`], [`TrainingError::Features`]: the slide does not count.
     #[inline]
     pub fn took(
@@ -268,11 +262,9 @@ impl Training {
         })
     }
 
-    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other textures
-    /// as they are to the bit, or one of this texture alone.
-    ///
-    /// # Errors
-    /// [`TrainingError::Unfinished`], [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
+    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other
+    /// textures as they are to the bit, or one of this texture alone. Errors: [`TrainingError::Unfinished`],
+    /// [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
     #[inline]
     pub fn encode<'r>(
         &self,

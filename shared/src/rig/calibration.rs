@@ -89,9 +89,7 @@ impl RigCalibration {
     }
 
     /// Returns the record in `bytes`, checked.
-    ///
-    /// # Errors
-    /// [`RigCalibrationError::Damaged`], or the error of [`RigCalibration::check`].
+    /// Errors: [`RigCalibrationError::Damaged`], or the error of [`RigCalibration::check`].
     #[inline]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RigCalibrationError> {
         let whole: &[u8; Self::BYTES] =

@@ -130,9 +130,7 @@ impl Control {
     }
 
     /// Takes other constants, between movements.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
+    /// Errors: [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
         if self.phase != Phase::Ready && !self.is_at_rest() {
             return Err(Refused::Busy);
@@ -283,9 +281,7 @@ impl Control {
     }
 
     /// Ends a fault. Lever and stage have to be homed again.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`] while the finger is still being lifted.
+    /// Errors: [`Refused::Busy`] while the finger is still being lifted.
     #[inline]
     pub fn reset(&mut self) -> Result<(), Refused> {
         if let Phase::Faulted(fault) = self.phase {

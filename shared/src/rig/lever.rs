@@ -323,9 +323,7 @@ impl Lever {
 
     /// One millisecond: `steps` made so far (downwards positive), and whether the limit switch is pressed. Returns the
     /// steps per second to make now, downwards positive.
-    ///
-    /// # Errors
-    /// The motor is to stand; the guard then lifts the finger.
+    /// Errors: the motor is to stand; the guard then lifts the finger.
     #[inline]
     pub(crate) fn tick(
         &mut self,

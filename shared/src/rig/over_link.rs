@@ -159,9 +159,7 @@ impl RigOverLink {
     }
 
     /// Takes other constants, between movements.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
+    /// Errors: [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
         if self.phase != Phase::Ready && !self.is_at_rest() {
             return Err(Refused::Busy);
@@ -190,9 +188,7 @@ impl RigOverLink {
     }
 
     /// Ends a fault.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`] while the finger is still being lifted.
+    /// Errors: [`Refused::Busy`] while the finger is still being lifted.
     pub fn reset(&mut self) -> Result<(), Refused> {
         if let Phase::Faulted(_) = self.phase {
             if !self.is_at_rest() {

@@ -141,9 +141,7 @@ impl Progress {
     }
 
     /// Checks a millisecond of an approach: the steps made, P_DC above no contact, and whether it shows contact.
-    ///
-    /// # Errors
-    /// [`Fault::PressureDead`] or [`Fault::LeverSlips`].
+    /// Errors: [`Fault::PressureDead`] or [`Fault::LeverSlips`].
     #[inline]
     pub(super) fn judge(&mut self, steps: i32, counts: f32, contact: bool) -> Result<(), Fault> {
         if self.same >= FROZEN_SAMPLES {

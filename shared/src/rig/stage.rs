@@ -271,9 +271,7 @@ impl Stage {
 
     /// One millisecond: the encoder's count, and whether the left limit switch is pressed. Returns the duty of the
     /// motor, -1 to 1.
-    ///
-    /// # Errors
-    /// The motor is to be off.
+    /// Errors: the motor is to be off.
     #[inline]
     pub(crate) fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, Fault> {
         self.counts.rotate_left(1);

@@ -72,8 +72,8 @@ fn inverse(matrix: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
 }
 
 impl Recipe {
-    /// ln of the likelihood of a texture that nobody knows: the covariance of the means, shrunk (OAS), less what their own
-    /// slides scatter.
+    /// ln of the likelihood of a texture that nobody knows: the covariance of the means, shrunk (OAS), less what their
+    /// own slides scatter.
     fn background(&self, movement: usize, k: f64, z: &[f64]) -> f64 {
         let cells = self.known.iter().map(|row| &row[movement]);
         let means: Vec<&(f64, Vec<f64>)> = cells.filter(|(n, _)| *n > 0.0).collect();
@@ -304,8 +304,8 @@ impl Recipe {
         }
     }
 
-    /// Four slides. Some textures are as they were learned, some drift, some are new; where the table knows speeds, some
-    /// are felt with a sensor of speed, some without, and some with one that loses track now and then.
+    /// Four slides. Some textures are as they were learned, some drift, some are new; where the table knows speeds,
+    /// some are felt with a sensor of speed, some without, and some with one that loses track now and then.
     fn present(
         &self,
         texture: usize,
@@ -367,8 +367,8 @@ impl Recipe {
         }
     }
 
-    /// Compares the explorer with the recipe after these slides. Limits are exceeded by less than the fixed point's error
-    /// now and then.
+    /// Compares the explorer with the recipe after these slides. Limits are exceeded by less than the fixed point's
+    /// error now and then.
     fn agrees(
         &self,
         explorer: &mut Explorer<'_, 20>,

@@ -82,8 +82,8 @@ impl Recipe {
         (-0.5 * norm - tail, all.len() >= 3)
     }
 
-    /// Posterior of the candidates, and log-odds that it is none of them; from the means of the slides, or from these in
-    /// whole steps.
+    /// Posterior of the candidates, and log-odds that it is none of them; from the means of the slides, or from these
+    /// in whole steps.
     fn decide(&self, whole_steps: bool) -> (Vec<f64>, Option<f64>) {
         let mut l = vec![0.0; self.known.len()];
         let (mut elsewhere, mut can_tell) = (0.0, true);
