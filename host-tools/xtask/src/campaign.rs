@@ -12,7 +12,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
-use crate::shell::{cargo, has_subcommand, hear, root, run, target};
+use crate::shell::{cargo, has_subcommand, hear, root, run};
 use crate::{emulate, firmware, page};
 pub(crate) use factory::{FOLDER, TABLES};
 
