@@ -64,10 +64,10 @@ fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
     let steps = found["/pac"].windows(2).map(|pair| pair[1].0 - pair[0].0);
     let gaps = steps.filter(|step| !(454_000..=455_000).contains(step));
     assert!(gaps.count() <= 1);
-    let [(at, verdict)] = of("Verdict")[..] else {
+    let [(when, verdict)] = of("Verdict")[..] else {
         panic!()
     };
-    assert_eq!(found["/verdict"][0].0, at * 1_000_000);
+    assert_eq!(found["/verdict"][0].0, when * 1_000_000);
     assert_eq!(found["/verdict"][0].1["name"], verdict["name"]);
     // the table was read in this session: textures have their names
     let (_, last) = found["/posterior"].last().unwrap();
