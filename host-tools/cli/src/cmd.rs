@@ -4,12 +4,10 @@ mod args;
 mod completions;
 mod convert;
 mod device;
-mod environment;
 mod evaluate;
 mod features;
 mod identify;
 mod import;
-mod known;
 mod learn;
 
 mod names;
@@ -23,12 +21,11 @@ mod table;
 mod table_file;
 mod textures;
 mod unpack;
-mod verbose;
 mod verify;
 
 use std::io::{self, Write as _};
 
-use clap::{ArgAction, CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
@@ -42,9 +39,6 @@ struct Tactus {
     /// Show no progress and no notices on the terminal, only results and errors
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Tell on standard error which files are read and written, and what is chosen; twice (-vv): also every frame to and from a probe
-    #[arg(long, short, global = true, action = ArgAction::Count)]
-    verbose: u8,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -54,8 +48,7 @@ struct Tactus {
 enum Command {
     Features(features::Args),
     Learn(learn::Args),
-    #[command(subcommand)]
-    Table(table::Command),
+    Table(table::Args),
     Report(report::Args),
     Identify(identify::Args),
     Evaluate(evaluate::Args),
@@ -65,7 +58,6 @@ enum Command {
     Study(study::Args),
     #[command(subcommand)]
     Device(device::Command),
-    Textures(known::Args),
     Completions(completions::Args),
     Import(import::Args),
     Convert(convert::Args),
@@ -84,16 +76,10 @@ Environment:
 
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
-/// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
-    let Tactus {
-        quiet,
-        verbose,
-        command,
-    } = Tactus::parse();
-    verbose::be_verbose(verbose);
+    let Tactus { quiet, command } = Tactus::parse();
     if quiet {
         progress::be_quiet();
     }
@@ -101,7 +87,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         None => identify::demonstrate(out)?,
         Some(Command::Features(args)) => features::run(&args, out)?,
         Some(Command::Learn(args)) => learn::run(&args, out)?,
-        Some(Command::Table(command)) => table::run(&command, out)?,
+        Some(Command::Table(args)) => table::run(&args, out)?,
         Some(Command::Report(args)) => report::run(&args, out)?,
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
@@ -110,7 +96,6 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
         Some(Command::Device(command)) => done = device::run(&command, out)?,
-        Some(Command::Textures(args)) => known::run(&args, out)?,
         Some(Command::Completions(args)) => completions::run(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,

@@ -1,7 +1,6 @@
-//! The board: chip, flash, pins, display and the rig on its pins, and what is measured of the code that runs on it.
+//! The board: chip, flash, pins, display and the rig on its pins.
 
 mod chip;
-pub mod cycles;
 mod display;
 mod driver;
 mod emulator;
@@ -32,12 +31,11 @@ pub use display::Display;
 pub use emulator::{Emulator, Reset};
 pub use error::Error;
 pub use flash::{FLASH, FlashWrite, STORE, places};
-pub use handler_profile::HandlerProfile;
 pub use motion::MotionPeer;
 pub use options::Options;
 pub use record::{Slide, Touch};
 pub use rig::{Output, Rig};
 pub use rigless::device::ResetCause;
-pub use stack::{StackLayout, StackLevel, StackUse};
-pub use timing::Timing;
+pub(crate) use stack::{StackLayout, StackLevel, StackUse};
+pub(crate) use timing::Timing;
 pub use upset::Switch;

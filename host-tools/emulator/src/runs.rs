@@ -1,14 +1,12 @@
 //! What the program does: a sub-command each.
 
 pub mod bench;
-pub mod campaign;
 mod cuts;
 mod error;
 pub mod faults;
 mod handheld;
 mod identify;
 mod serve;
-mod soak;
 mod stack_depth;
 
 use std::process::ExitCode;
@@ -23,13 +21,13 @@ use error::RunError;
 enum Cli {
     /// Have the firmware identify a texture
     ///
-    /// Learns some textures of a simulated world, gives their table to the firmware, puts one of them under its finger and has
-    /// it find out which.
+    /// Learns some textures of a simulated world, gives their table to the firmware, puts one of them under its finger
+    /// and has it find out which.
     #[command(after_help = "Examples:
   tactus-emulator identify --elf tactus-rig                       a texture drawn by the seed
   tactus-emulator identify --elf tactus-rig --texture 10 --log    with the firmware's own log
   tactus-emulator identify --elf tactus-rig --recording 3         slides of a real BioTac
-`cargo xtask emulate` builds both and does this. With --port N it serves the board's serial port on that TCP port instead.")]
+`cargo xtask emulate` builds both and does this. With --port N it serves the board's serial port there instead.")]
     Identify(identify::Args),
     /// Have a simulated hand find out with the handheld's firmware what a texture is
     ///
@@ -43,19 +41,17 @@ enum Cli {
     #[command(after_help = "Example:
   tactus-emulator serve --elf tactus-rig --port 7429              talk to it yourself")]
     Serve(serve::Args),
-    /// Have it identify many textures, and cut its power, against the bars
-    Campaign(campaign::Args),
-    /// Break the simulated rig of the PC in many ways, at any moment of whatever its probe does
+    /// Cut its power at every word that it stores
+    Cuts(cuts::Args),
+    /// Break the rig in many ways, at any moment of whatever its probe does
     Faults(faults::Args),
-    /// Have it work for a day on the simulated rig and for an hour on the board, with random faults
-    Soak(soak::Args),
     /// Count the instructions of the core's kernels
     Bench(bench::Args),
     /// Measure how deep its stack gets
     Stack(stack_depth::Args),
 }
 
-/// Whether all bars are met.
+/// Runs a sub-command.
 fn run(cli: &Cli) -> Result<ExitCode, RunError> {
     let met = |met| {
         if met {
@@ -68,9 +64,8 @@ fn run(cli: &Cli) -> Result<ExitCode, RunError> {
         Cli::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Handheld(args) => handheld::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Serve(args) => serve::run(args).map(|()| ExitCode::SUCCESS),
-        Cli::Campaign(args) => campaign::run(args).map(met),
+        Cli::Cuts(args) => cuts::run(args).map(met),
         Cli::Faults(args) => faults::run(args).map(met),
-        Cli::Soak(args) => soak::run(args).map(met),
         Cli::Bench(args) => bench::run(args),
         Cli::Stack(args) => stack_depth::run(args).map(|()| ExitCode::SUCCESS),
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use tactus_core::sensor::FingerName;
 use tactus_lab::eval::show::count;
 use tactus_lab::sim::handheld::ground;
-use tactus_lab::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
+use tactus_lab::sim::scenario::{Scenario, Step, TIMEOUT_S, UnknownTexture, texture};
 use tactus_world::faults::Fault;
 use tactus_world::flow::HEIGHT_MM;
 use tactus_world::person::Hand;
@@ -33,7 +33,7 @@ const OPEN: &str = "Slide on to be sure";
 pub enum PlayError {
     /// An unknown texture.
     #[error(transparent)]
-    Texture(#[from] InvalidScenario),
+    Texture(#[from] UnknownTexture),
     /// The emulator.
     #[error(transparent)]
     Emulator(#[from] Error),
@@ -48,39 +48,10 @@ pub enum PlayError {
         /// Its time, s of virtual time.
         at_s: f64,
         /// The unmet expectation.
-        unmet: Unmet,
+        unmet: String,
         /// The text on the display.
         display: String,
     },
-}
-
-/// The expectations that were not met.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Unmet {
-    /// A text that the display should show.
-    #[error("{text:?} is not seen within {within_s} s")]
-    NotSeen {
-        /// Its parts.
-        text: Vec<String>,
-        /// Time for which it was looked for, s.
-        within_s: f64,
-    },
-    /// A text that it should not show.
-    #[error("{0:?} is seen")]
-    Seen(String),
-    /// The display should be off.
-    #[error("the display is not off")]
-    NotDark,
-    /// A tone, and those that were heard.
-    #[error("{0} Hz are not heard, but {1:?}")]
-    NotHeard(u32, Vec<u32>),
-    /// The display should ask for a slide.
-    #[error("the display does not want a slide")]
-    NoSlideWanted,
-    /// There should be a verdict.
-    #[error("not enough: {}", count(*.0, "slide"))]
-    NotEnough(u32),
 }
 
 /// The person's view of an exploration.
@@ -111,7 +82,7 @@ impl Seen {
 }
 
 /// A board on which a scenario was played.
-pub struct PlayedBoard {
+pub(crate) struct PlayedBoard {
     /// As it is in the end.
     pub board: Emulator,
     /// The views of the person, and the time when each began, ns.
@@ -131,7 +102,7 @@ pub fn play(
 
 /// The same, and its host sends these bytes when it is switched on. From then on it reports its events:
 /// [`Emulator::received`].
-pub fn play_to(
+pub(crate) fn play_to(
     scenario: &Scenario,
     finger: FingerName,
     elf: &Path,
@@ -181,7 +152,7 @@ struct Played<'s> {
 }
 
 /// The result of a step: the unmet expectation.
-type Done = Result<Result<(), Unmet>, PlayError>;
+type Done = Result<Result<(), String>, PlayError>;
 
 impl Played<'_> {
     fn board(&mut self) -> &mut Emulator {
@@ -246,7 +217,7 @@ impl Played<'_> {
     fn slide(&mut self, force_n: f64, pace_mm_s: f64, seconds: f64) -> Done {
         self.intend(force_n, 0.0);
         if !self.until(TIMEOUT_S, |display| display.shows(SLIDE))? {
-            return Ok(Err(Unmet::NoSlideWanted));
+            return Ok(Err("the display does not want a slide".into()));
         }
         self.run_s(Step::REACTION_MS as f64 * 1e-3)?;
         self.intend(force_n, pace_mm_s);
@@ -258,6 +229,20 @@ impl Played<'_> {
         Ok(Ok(()))
     }
 
+    /// The buzzer's tones of the last 2 s, Hz.
+    fn tones(&mut self) -> Vec<u32> {
+        let now_ns = self.board().now_ns();
+        let rig = self.board().rig();
+        let late = rig
+            .trace()
+            .filter(|(at_ns, _)| at_ns + 2_000_000_000 > now_ns);
+        late.filter_map(|(_, output)| match output {
+            Output::Buzzer(tone) => *tone,
+            _ => None,
+        })
+        .collect()
+    }
+
     fn act(&mut self, step: &Step) -> Done {
         let shows =
             |display: &Display, text: &[String]| text.iter().all(|text| display.shows(text));
@@ -265,34 +250,24 @@ impl Played<'_> {
             Step::Note { .. } => {}
             Step::See { text, within_s } => {
                 if !self.until(*within_s, |display| shows(display, text))? {
-                    let (text, within_s) = (text.clone(), *within_s);
-                    return Ok(Err(Unmet::NotSeen { text, within_s }));
+                    return Ok(Err(format!("{text:?} is not seen within {within_s} s")));
                 }
             }
             Step::Miss { text } => {
                 let rig = self.board().rig();
                 if let Some(text) = text.iter().find(|text| rig.display().shows(text)) {
-                    return Ok(Err(Unmet::Seen(text.clone())));
+                    return Ok(Err(format!("{text:?} is seen")));
                 }
             }
             Step::Dark { within_s } => {
                 if !self.until(*within_s, |display| display.picture().is_none())? {
-                    return Ok(Err(Unmet::NotDark));
+                    return Ok(Err("the display is not off".into()));
                 }
             }
             Step::Hear { hz } => {
-                let now_ns = self.board().now_ns();
-                let rig = self.board().rig();
-                let heard: Vec<u32> = rig
-                    .trace()
-                    .filter(|(at_ns, _)| at_ns + 2_000_000_000 > now_ns)
-                    .filter_map(|(_, output)| match output {
-                        Output::Buzzer(tone) => *tone,
-                        _ => None,
-                    })
-                    .collect();
+                let heard = self.tones();
                 if !heard.iter().any(|tone| tone.abs_diff(*hz) * 50 <= *hz) {
-                    return Ok(Err(Unmet::NotHeard(*hz, heard)));
+                    return Ok(Err(format!("{hz} Hz are not heard, but {heard:?}")));
                 }
             }
             Step::Hand { force_n, pace_mm_s } => self.intend(*force_n, *pace_mm_s),
@@ -317,7 +292,7 @@ impl Played<'_> {
                         return Ok(Ok(()));
                     }
                 }
-                return Ok(Err(Unmet::NotEnough(*slides)));
+                return Ok(Err(format!("not enough: {}", count(*slides, "slide"))));
             }
             Step::Press { ms, times } => {
                 for _ in 0..*times {

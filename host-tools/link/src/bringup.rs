@@ -16,11 +16,11 @@ mod seams;
 mod steps;
 pub mod weights;
 
-pub use journal::{Entry, EntryMistake, EntrySeries, Journal};
+pub use journal::{Entry, EntryMistake, Journal};
 pub use line::Line;
 pub use mistakes::{MISTAKES, Mistake, Named};
 pub use mounted::Mounted;
-pub use report::{Report, plot};
+pub use report::Report;
 pub use result::{Series, StepResult};
 pub use seams::{Board, Person, Probe, Trouble};
 pub use steps::{Bench, Image, STEPS, Step};

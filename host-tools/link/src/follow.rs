@@ -105,12 +105,17 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Whether nothing differs by more than [`ALLOWED`], and there was something to compare.
+    /// The largest of all differences.
+    pub fn largest(&self) -> f32 {
+        let all = [self.properties, self.signal, self.posterior, self.expected];
+        all.into_iter().fold(0.0, f32::max)
+    }
+
+    /// Returns true where nothing differs by more than [`ALLOWED`], and there was something to compare.
     pub fn agrees(&self) -> bool {
-        let largest = [self.properties, self.signal, self.posterior, self.expected];
         self.slides > 0
             && self.posteriors > 0
-            && largest.into_iter().all(|d| d <= ALLOWED)
+            && self.largest() <= ALLOWED
             && self.other_choices.is_empty()
             && self.rejected_only_there == 0
             && self.other_verdicts == 0

@@ -65,7 +65,6 @@ impl Log {
     /// # Errors
     /// It is there, or cannot be written.
     pub fn create(path: &Path, port: &str) -> io::Result<Self> {
-        tracing::info!(file = %path.display(), "writes");
         let file = File::create_new(path).map_err(|why| match why.kind() {
             io::ErrorKind::AlreadyExists => {
                 io::Error::new(why.kind(), "is there already: give the log another name")

@@ -111,7 +111,6 @@ impl<E: Transaction> Job<E> {
                 LinkError::Disturbed
             });
         }
-        tracing::info!(tries = sent.ids.len() + 1, "asks again");
         sent.ids.push(session.request(sent.command.clone(), send)?);
         Ok(true)
     }

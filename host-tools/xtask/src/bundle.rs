@@ -73,7 +73,7 @@ const PRODUCTS: [Product; 3] = [
             Some(BROWSER.triple),
         ),
         lacks: || toolchain::get(BROWSER).map(drop),
-        build: || Ok(("tactus-page.html".to_owned(), page::build()?.page)),
+        build: || Ok(("tactus-page.html".to_owned(), page::build("release")?.page)),
     },
 ];
 /// The images, as [`Product::made_of`].
@@ -126,8 +126,7 @@ fn files(only: &[String]) -> Result<Files> {
     if !images.is_empty() {
         for elf in firmware::compile(&images)? {
             let (name, bytes) = (firmware::name(&elf)?, read(&elf)?);
-            let (flat, hex) = image::formats(&bytes).with_context(|| name.to_owned())?;
-            files.insert(format!("{name}.hex"), hex.into());
+            let flat = image::flat(&bytes).with_context(|| name.to_owned())?;
             files.insert(format!("{name}.bin"), flat);
             files.insert(format!("{name}.elf"), bytes);
         }

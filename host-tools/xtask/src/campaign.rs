@@ -1,5 +1,4 @@
 //! `cargo xtask campaign`: long checks, and how each of them ended in one sentence.
-mod board;
 mod factory;
 mod fuzz;
 mod seeds;
@@ -12,7 +11,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
-use crate::shell::{cargo, has_subcommand, hear, root, run, target};
+use crate::shell::{hear, root, run};
 use crate::{emulate, firmware, page};
 pub(crate) use factory::{FOLDER, TABLES};
 
@@ -20,15 +19,10 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask campaign all --book                   everything, a day or two; each result goes into the book
   cargo xtask campaign rig --finger mems            seeds 1 to 20 on the emulated board, with another finger
-  cargo xtask campaign identify --seeds 200-330     every method
-  cargo xtask campaign study --seeds 1-10 -- --simulations 8000
-  cargo xtask campaign faults --seeds 1-2000        goes on where it was interrupted
-  cargo xtask campaign faults --seeds 17 -- --again one of them once more
-  cargo xtask campaign boards -- --simulated 4 --recordings 0
-  cargo xtask campaign soak -- --pc-hours 1 --board-hours 0
+  cargo xtask campaign rig --seeds 1-20 -- --recording 3   slides of a real BioTac under the finger
+  cargo xtask campaign faults --seeds 1-2000
   cargo xtask campaign factory -- --write           makes the tables that come with the firmware, shared/tables/*.tact
-  cargo xtask campaign fuzz -- table --seconds 60   one target
-  cargo xtask campaign mutants -- --in-diff my.diff only what a diff touches";
+  cargo xtask campaign fuzz -- table --seconds 60   one target";
 
 /// The page of the book that lists the results.
 const BOOK: &str = "docs/src/tests.md";
@@ -64,44 +58,23 @@ enum Part {
     Factory,
     /// The page in a browser, with the firmware on the emulated board
     Page,
-    /// The package for the registry, packed, and compiled as others will
-    Package,
-    /// Tests that `cargo xtask test` leaves out, in the workspace and on emulated boards
+    /// Tests that `cargo xtask test` leaves out, and all seeds of the others, in the workspace and on emulated boards
     Tests,
     /// Explorations on the emulated board
     Rig,
     /// Explorations by the handheld on the emulated board, in a hand that differs from seed to seed
     Handheld,
-    /// Explorations on emulated boards, simulated and recorded, which the PC follows to the bit
-    Boards,
     /// Power cuts at every word that the firmware stores
     Cuts,
     /// The PC's simulated rig, which breaks at any moment of whatever its probe does
     Faults,
     /// The same on emulated boards, with the firmware
     BoardFaults,
-    /// A day on the simulated rig and an hour on the emulated board, with random faults
-    Soak,
-    /// `tactus study all`, with few simulations
-    Study,
-    /// `tactus identify --simulated`, by every method
-    Identify,
-    /// `tactus simulate`
-    Simulate,
-    /// `tactus learn-by-hand`
-    LearnByHand,
-    /// `tactus verify --simulated`: a texture against itself, and the next one against it
-    Verify,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
     Press,
-    /// libFuzzer against frames, tables, the store's flash, recordings and scenarios, on stable Rust; wants a C++
+    /// libFuzzer against frames, tables, the store's flash and recordings, on stable Rust; wants a C++
     /// compiler
     Fuzz,
-    /// The same with a bug planted in each target, which must be found
-    Planted,
-    /// The core's tests on copies of the core with one thing changed (cargo-mutants): a mutant that survives is seen by
-    /// no test
-    Mutants,
 }
 
 impl Part {
@@ -113,8 +86,7 @@ impl Part {
     /// The seeds of a part that takes them.
     fn seeds(self, options: &Options) -> Option<RangeInclusive<u64>> {
         let usual = match self {
-            Self::Study | Self::Press => 1..=100,
-            Self::Identify | Self::Simulate | Self::LearnByHand | Self::Verify => 1..=50,
+            Self::Press => 1..=100,
             Self::Rig | Self::Handheld => 1..=20,
             Self::Faults | Self::BoardFaults => 1..=300,
             _ => return None,
@@ -207,20 +179,12 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     match (part, seeds) {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
         (Part::Page, _) => page::emulated().map(|()| "passed".into()),
-        (Part::Package, _) => package(),
         (Part::Tests, _) => left_out(),
-        (Part::Boards, _) => on_boards("campaign", &["--cuts", "0"], options),
-        (Part::Cuts, _) => on_boards(
-            "campaign",
-            &["--simulated", "0", "--recordings", "0"],
-            options,
-        ),
-        (Part::Soak, _) => on_boards("soak", &[], options),
+        (Part::Cuts, _) => result(&mut emulate::command("cuts", &options.options)?),
         (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
-        (Part::Planted, _) => fuzz::fuzz(&["--planted", "--seconds", "150"].map(OsString::from)),
-        (Part::Mutants, _) => mutants(&options.options),
-        (_, Some(seeds)) => seeds::run(part, &seeds, options),
+        (Part::Press, Some(seeds)) => seeds::presses(&seeds),
+        (_, Some(seeds)) => seeds::run(part == Part::Handheld, &seeds, options),
         (_, None) => Ok(String::new()),
     }
 }
@@ -243,82 +207,43 @@ fn sentence(lines: &[String]) -> String {
     all.join(" ")
 }
 
-/// Runs the emulator with the rig's firmware.
-fn on_boards(run: &str, usual: &[&str], options: &Options) -> Result<String> {
-    let usual = usual.iter().map(OsString::from);
-    // what is given comes last, and counts
-    let all: Vec<OsString> = usual.chain(options.options.iter().cloned()).collect();
-    result(&mut emulate::command(run, &all)?)
-}
-
 fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
-    let file = target()
-        .join("campaign")
-        .join(part.name())
-        .with_extension("jsonl");
     let count = seeds.end() - seeds.start() + 1;
-    let mut all: Vec<OsString> = vec!["--faults".into(), count.to_string().into()];
-    all.extend([
-        "--seed".into(),
-        seeds.start().to_string().into(),
-        "--out".into(),
-        file.into(),
-    ]);
+    let numbers = [("--faults", count), ("--seed", *seeds.start())];
+    let numbers = numbers.map(|(name, number)| [name.into(), number.to_string().into()]);
+    let all: Vec<OsString> = numbers
+        .into_iter()
+        .flatten()
+        .chain(options.options.iter().cloned())
+        .collect();
+    let mut cases = if part == Part::BoardFaults {
+        emulate::command("faults", &all)?
+    } else {
+        run(&mut emulate::build())?;
+        let mut cases = emulate::program("faults");
+        cases.args(all);
+        cases
+    };
     if let Some(jobs) = options.jobs {
-        all.extend(["--jobs".into(), jobs.to_string().into()]);
+        cases.env("RAYON_NUM_THREADS", jobs.to_string());
     }
-    all.extend(options.options.iter().cloned());
-    if part == Part::BoardFaults {
-        all.push("--board".into());
-        return result(&mut emulate::command("faults", &all)?);
-    }
-    run(&mut emulate::build())?;
-    result(emulate::program("faults").args(all))
+    result(&mut cases)
 }
 
-/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own.
+/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own, and all others with all of
+/// their seeds.
 fn left_out() -> Result<String> {
-    let ignored = ["--", "--ignored", "--skip", "the_whole_campaign"];
-    let mut board_tests = emulate::tests();
-    let board_tests = emulate::with_images(&mut board_tests, &firmware::elves()?)?;
-    let (mut passed, mut workspace) = (0, cargo());
-    workspace.args(["test", "--release", "--workspace", "--no-fail-fast"]);
-    for tests in [&mut workspace, board_tests] {
-        hear(tests.args(ignored), |line| {
-            let result = line.strip_prefix("test result: ok. ");
-            let count = result.and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
-            passed += count.unwrap_or_default();
-        })?;
-    }
+    let mut passed = 0;
+    let mut tests = emulate::workspace("test");
+    let tests = emulate::with_images(&mut tests, &firmware::elves()?)?;
+    tests.args(["--no-fail-fast", "--", "--include-ignored"]);
+    tests.env("TACTUS_ALL_SEEDS", "1");
+    hear(tests.args(["--skip", "the_whole_campaign"]), |line| {
+        let result = line.strip_prefix("test result: ok. ");
+        let count = result.and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
+        passed += count.unwrap_or_default();
+    })?;
     Ok(format!("{passed} tests passed."))
-}
-
-/// Packs and compiles the core, which alone goes to the registry; without the network, as the workspace was built.
-fn package() -> Result<String> {
-    let mut package = cargo();
-    package.args([
-        "package",
-        "--package",
-        "tactus-core",
-        "--allow-dirty",
-        "--offline",
-        "--locked",
-    ]);
-    run(&mut package).map(|()| "The package compiles.".into())
-}
-
-fn mutants(options: &[OsString]) -> Result<String> {
-    if !has_subcommand("mutants") {
-        return Ok("Not run: cargo install cargo-mutants --locked".into());
-    }
-    let mut cargo = cargo();
-    cargo.args(["mutants", "--package", "tactus-core"]);
-    cargo.args(["--test-package", "tactus-core", "--profile", "mutants"]);
-    for module in ["sensor", "table", "explorer"] {
-        cargo.args(["--file", &format!("shared/src/{module}*")]);
-        cargo.args(["--file", &format!("shared/src/{module}*/**")]);
-    }
-    result(cargo.args(options))
 }
 
 #[cfg(test)]

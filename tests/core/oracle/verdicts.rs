@@ -1,4 +1,5 @@
-//! Known, changed or new, in f64 and straight from the recipe, for one movement: what the fixed-point form is held against.
+//! Known, changed or new, in f64 and straight from the recipe, for one movement: what the fixed-point form is held
+//! against.
 //!
 //! V = (1/k + 1/n) I + D is left as it is, a full matrix in the space of the whitener of `oracle`.
 #![allow(unreachable_pub)]

@@ -1,16 +1,14 @@
 //! `tactus convert`: recordings and session logs for the tools of others.
 
-pub(super) mod mcap;
+mod mcap;
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use serde::Serialize;
 use tactus_lab::data::recordings::RecordingSet;
 
-use super::output::{Format, UsageError, print_json};
 use super::progress::with_progress;
 use super::table_file::is_pipe;
 
@@ -28,25 +26,10 @@ pub(crate) struct Args {
     /// The file to write; "-" writes to standard output
     #[arg(long, value_name = "FILE")]
     mcap: PathBuf,
-    /// How to print what was written
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// The file in `convert --format json`.
-#[derive(Serialize)]
-struct Written {
-    file: String,
-    bytes: u64,
-}
-
-/// Writes what was asked for; a file that is there already is left alone.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let Args { from, mcap, format } = args;
-    if is_pipe(mcap) && *format == Format::Json {
-        let say = "the file goes to standard output (\"-\"), so --format json cannot";
-        return Err(UsageError(say.to_owned()).into());
-    }
+    let Args { from, mcap } = args;
     if from.is_dir() {
         let set = RecordingSet::open(from)?;
         let to = create(mcap)?;
@@ -57,24 +40,16 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     } else {
         mcap::log(create(mcap)?, from)?;
     }
-    if is_pipe(mcap) {
-        return Ok(());
-    }
-    let bytes = std::fs::metadata(mcap)?.len();
-    let file = mcap.display().to_string();
-    match format {
-        Format::Json => print_json(&[Written { file, bytes }], out)?,
-        Format::Text => writeln!(out, "{file}: {bytes} bytes")?,
+    if !is_pipe(mcap) {
+        let bytes = std::fs::metadata(mcap)?.len();
+        writeln!(out, "{}: {bytes} bytes", mcap.display())?;
     }
     Ok(())
 }
 
-/// The destination of a file.
 type To = BufWriter<Box<dyn Write + Send>>;
 
-/// Creates a new file, or takes standard output.
 fn create(path: &Path) -> anyhow::Result<To> {
-    tracing::info!(file = %path.display(), "writes");
     // the lock of standard output is this thread's
     Ok(BufWriter::new(if is_pipe(path) {
         Box::new(io::stdout())

@@ -12,9 +12,6 @@ pub(crate) fn unknown<'n>(wanted: &str, known: impl IntoIterator<Item = &'n str>
 }
 
 /// The name that was typed, however its capitals are; or as a shell completes it, if that is one name only.
-///
-/// # Errors
-/// There is none: [`unknown`].
 pub(crate) fn find<'n>(wanted: &str, known: &[&'n str]) -> Result<&'n str, String> {
     let wanted = wanted.trim();
     let as_typed = known.iter().find(|name| **name == wanted);

@@ -17,7 +17,6 @@ pub(crate) struct Plot {
     plot: Option<PathBuf>,
 }
 
-/// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlotError {
     /// A folder has the name of the file.
@@ -51,15 +50,11 @@ fn is_svg(path: &Path) -> bool {
 }
 
 impl Plot {
-    /// Says whether pictures are wanted.
     pub(crate) fn is_asked(&self) -> bool {
         self.plot.is_some()
     }
 
     /// Where pictures are to go, if any are wanted: found out before the work, not after it.
-    ///
-    /// # Errors
-    /// See [`PlotError`].
     pub(crate) fn open(&self) -> Result<Option<Canvas>, PlotError> {
         let Some(path) = self.plot.clone() else {
             return Ok(None);
@@ -91,7 +86,6 @@ impl Plot {
     }
 }
 
-/// Where pictures go, which can be written.
 pub(crate) struct Canvas {
     path: PathBuf,
     is_file: bool,
@@ -99,9 +93,6 @@ pub(crate) struct Canvas {
 
 impl Canvas {
     /// Writes them, whole or not at all, and says so on stderr after what was printed.
-    ///
-    /// # Errors
-    /// See [`PlotError`].
     pub(crate) fn write(
         self,
         title: &str,

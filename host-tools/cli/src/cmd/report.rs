@@ -57,7 +57,6 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// What the page is made of.
 #[derive(Serialize)]
 struct Page<'r> {
     name: String,
@@ -67,7 +66,6 @@ struct Page<'r> {
     map: String,
 }
 
-/// Reports on a table, or on recorded slides.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if let Some(table) = &args.table {
         return of_table(table, args, out);

@@ -317,6 +317,3 @@ impl Board {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

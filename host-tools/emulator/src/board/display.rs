@@ -101,7 +101,7 @@ impl Display {
     }
 
     /// Returns true if a text is visible in one of the larger fonts, as headlines of up to 18 letters are.
-    pub fn shows_large(&self, text: &str) -> bool {
+    pub(crate) fn shows_large(&self, text: &str) -> bool {
         self.shows_in(text, &[&FONT_7X13_BOLD, &FONT_10X20])
     }
 
@@ -128,7 +128,7 @@ impl Display {
 
     /// Time when its picture was wholly written, ns; `None` before the first picture. The same picture again is no new
     /// one.
-    pub fn written_ns(&self) -> Option<u64> {
+    pub(crate) fn written_ns(&self) -> Option<u64> {
         self.whole_ns
     }
 

@@ -11,7 +11,6 @@ use rigless::soc::stm32f427::generated::flash::Register as FlashRegister;
 use rigless::time::VirtualNanos;
 
 use super::chip::Board;
-use super::cycles::Tracer;
 use super::flash::{self, FlashWrite};
 use super::halt::Halt;
 use super::handler_profile::HandlerProfiler;
@@ -58,7 +57,6 @@ pub(crate) struct Driver {
     pub(crate) log: Option<Log>,
     pub(crate) stack: Option<Stack>,
     pub(crate) profiler: Option<HandlerProfiler>,
-    pub(crate) tracer: Option<Tracer>,
     pub(crate) timing: Timing,
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
@@ -380,9 +378,6 @@ impl emulator::Driver<Board> for Driver {
         }
         if let Settled::Access { access, .. } = &settled {
             self.timing.access(access);
-            if let Some(tracer) = &mut self.tracer {
-                tracer.access(access);
-            }
         }
         match settled {
             Settled::Access { access, .. } if access.kind == AccessKind::Write => {
@@ -397,9 +392,6 @@ impl emulator::Driver<Board> for Driver {
                 }
                 if let Some(profiler) = &mut self.profiler {
                     profiler.hit(&hit, host);
-                }
-                if let Some(tracer) = &mut self.tracer {
-                    tracer.hit(&hit, host);
                 }
             }
             _ => {}

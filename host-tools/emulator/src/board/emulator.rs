@@ -1,5 +1,4 @@
 //! The emulator's interface for its users.
-use std::ops::Range;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -16,20 +15,18 @@ use tactus_world::faults::Fault;
 use tactus_world::world::Setup;
 
 use super::chip::Board;
-use super::cycles::{CycleProfile, Tracer};
 use super::driver::{Command, Driver, Standing};
 use super::error::Error;
 use super::flash::{self, FlashWrite};
 use super::halt::Halt;
-use super::handler_profile::{HandlerProfile, HandlerProfiler};
+use super::handler_profile::HandlerProfiler;
 use super::log::Log;
 use super::options::Options;
 use super::pins::{self, PinId};
 use super::referee::{Referee, Violation};
-use super::registers::register;
 use super::rig::{Rig, SharedRig, lock};
 use super::stack::{Stack, StackLayout, StackUse};
-use super::symbols::{code, symbols};
+use super::symbols::symbols;
 use super::timing::Timing;
 use super::upset::Switch;
 
@@ -52,8 +49,6 @@ pub struct Emulator {
     now_ns: u64,
     /// name, address without the Thumb bit, size in bytes
     symbols: Vec<(String, u64, u64)>,
-    /// where the image has its code
-    code: Vec<Range<u64>>,
 }
 
 impl Emulator {
@@ -68,7 +63,6 @@ impl Emulator {
             source,
         };
         let symbols = symbols(&elf).map_err(bad)?;
-        let code = code(&elf).map_err(bad)?;
         let block = symbols.iter().find(|(name, ..)| name == "_SEGGER_RTT");
         let log = block.and_then(|(_, address, _)| Log::new(&elf, *address));
         let mut images = vec![Image::new(path, elf, None)?];
@@ -86,7 +80,6 @@ impl Emulator {
             log,
             stack: None,
             profiler: None,
-            tracer: None,
             timing: Timing::default(),
             instructions: 0,
             tick_ns: options.tick_ns.max(1),
@@ -122,7 +115,6 @@ impl Emulator {
             thread: Some(thread),
             now_ns: 0,
             symbols,
-            code,
         };
         emulator.wait()?;
         emulator.with(|standing| {
@@ -182,7 +174,7 @@ impl Emulator {
     }
 
     /// Runs in steps of `step_ns` until `done` returns true, at most until `limit_ns`; returns true if it did.
-    pub fn run_to(
+    pub(crate) fn run_to(
         &mut self,
         limit_ns: u64,
         step_ns: u64,
@@ -443,83 +435,39 @@ impl Emulator {
         self.with(|standing| std::mem::take(&mut standing.driver.stored))
     }
 
-    /// Address of the core's next instruction.
-    pub fn program_counter(&mut self) -> Result<Option<u32>, Error> {
-        self.with(|standing| register(standing.host, 15))
-    }
-
     /// Instructions since power-up; a core that sleeps makes none.
     pub fn instructions(&mut self) -> Result<u64, Error> {
         self.with(|standing| standing.driver.instructions)
     }
 
     /// Counts from now on the instructions of the handlers at these addresses.
-    pub fn count_handlers(&mut self, addresses: Vec<u64>) -> Result<(), Error> {
+    pub(crate) fn count_handlers(&mut self, addresses: Vec<u64>) -> Result<(), Error> {
         self.with(move |standing| {
             standing.driver.profiler = Some(HandlerProfiler::new(addresses, standing.host));
         })
     }
 
-    /// The counts since [`Emulator::count_handlers`], in the order of the addresses.
-    pub fn handlers(&mut self) -> Result<Vec<HandlerProfile>, Error> {
+    /// Instructions of all handlers since [`Emulator::count_handlers`].
+    pub fn handlers(&mut self) -> Result<u64, Error> {
         self.with(|standing| {
             let profiler = standing.driver.profiler.as_ref();
-            profiler.map_or_else(Vec::new, |profiler| profiler.handlers.clone())
-        })
-    }
-
-    /// Follows every instruction from now on with the model of the core's [cycles](super::cycles), by groups of
-    /// handlers at these addresses. With a switch, those that are executed while the word at that address is not 0.
-    /// Costs most of the speed.
-    pub fn trace_cycles(
-        &mut self,
-        groups: Vec<Vec<u64>>,
-        switch: Option<u64>,
-    ) -> Result<(), Error> {
-        let acr = self.register(flash::ACR)?;
-        let code = self.code.clone();
-        self.with(move |standing| {
-            let tracer = Tracer::new(
-                code,
-                &groups,
-                acr,
-                switch.map(|at| at as u32),
-                standing.host,
-            );
-            standing.driver.tracer = Some(tracer);
-        })
-    }
-
-    /// The cycles since [`Emulator::trace_cycles`] or the last call.
-    pub fn cycle_profile(&mut self) -> Result<CycleProfile, Error> {
-        self.with(|standing| {
-            let tracer = standing.driver.tracer.as_mut();
-            tracer.map(Tracer::take).unwrap_or_default()
-        })
-    }
-
-    /// The cycles since then, and an end of [`Emulator::trace_cycles`].
-    pub fn untrace_cycles(&mut self) -> Result<CycleProfile, Error> {
-        self.with(|standing| {
-            let tracer = standing.driver.tracer.take();
-            let profile = tracer.map(|tracer| tracer.stop(standing.host));
-            profile.unwrap_or_default()
+            profiler.map_or(0, |profiler| profiler.instructions)
         })
     }
 
     /// Punctuality of slots and servo since the last call.
-    pub fn timing(&mut self) -> Result<Timing, Error> {
+    pub(crate) fn timing(&mut self) -> Result<Timing, Error> {
         self.with(|standing| std::mem::take(&mut standing.driver.timing))
     }
 
     /// Measures the depth of the stack from now on. To be called at time 0: it paints the whole stack. Costs most of
     /// the speed.
-    pub fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
+    pub(crate) fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
         self.with(|standing| standing.driver.stack = Some(Stack::new(layout, standing.host)))
     }
 
     /// The use of the stack since [`Emulator::measure_stack`]; `None` without it.
-    pub fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
+    pub(crate) fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
         self.with(|standing| {
             let stack = standing.driver.stack.as_mut();
             stack.map(|stack| stack.found(standing.host))

@@ -11,9 +11,6 @@ pub const STORE: Range<u64> = 0x0810_0000..0x0814_0000;
 /// The array, both banks.
 pub(crate) const ARRAY: Range<u64> = FLASH..FLASH + (2 << 20);
 
-/// The register of the wait states and the caches.
-pub(super) const ACR: u64 = 0x4002_3C00;
-
 /// CR: program, sector erase, mass erase, sector number, parallelism, start, lock.
 const PG: u64 = 1;
 const SER: u64 = 1 << 1;
@@ -142,16 +139,6 @@ mod tests {
     }
 
     #[test]
-    fn stores_program_only_as_cr_allows() {
-        let word = PG | 2 << PSIZE_SHIFT;
-        assert_eq!(refusal(word, Width::W32), 0);
-        assert_eq!(refusal(word, Width::W8), PGPERR);
-        assert_eq!(refusal(PG, Width::W8), 0);
-        assert_eq!(refusal(2 << PSIZE_SHIFT, Width::W32), PGSERR);
-        assert_eq!(refusal(word | LOCK, Width::W32), PGSERR);
-    }
-
-    #[test]
     fn what_happens_to_the_store_is_noted_by_its_place_in_it() {
         assert_eq!(
             FlashWrite::program(0x0810_4008, Width::W32, 7),
@@ -176,22 +163,5 @@ mod tests {
         assert_eq!(places(4), 0x1_0000..0x2_0000);
         assert_eq!(places(5), 0x2_0000..0x4_0000);
         assert_eq!(places(6), 0..0);
-    }
-
-    #[test]
-    fn only_what_prepares_an_erase_is_made_slower() {
-        let by_words = SER | 2 << PSIZE_SHIFT;
-        assert_eq!(slower(by_words), Some(SER));
-        for other in [PG, STRT, LOCK] {
-            assert_eq!(slower(by_words | other), None);
-        }
-    }
-
-    #[test]
-    fn only_a_sector_erase_that_began_erases() {
-        let cr = SER | 17 << SNB_SHIFT;
-        assert_eq!(erased(cr, BSY), Some(0x0810_4000..0x0810_8000));
-        assert_eq!(erased(cr, 0), None);
-        assert_eq!(erased(17 << SNB_SHIFT, BSY), None);
     }
 }

@@ -23,8 +23,6 @@ pub(super) struct Running<T> {
 pub(super) struct Handlers<T> {
     addresses: Vec<u64>,
     running: Vec<Running<T>>,
-    /// All code is watched already.
-    is_watched: bool,
 }
 
 impl<T> Handlers<T> {
@@ -36,29 +34,9 @@ impl<T> Handlers<T> {
             );
         }
         Self {
-            is_watched: false,
-            ..Self::among_watched(addresses)
-        }
-    }
-
-    /// Handlers in code of which every instruction is watched already.
-    pub(super) fn among_watched(addresses: Vec<u64>) -> Self {
-        Self {
             addresses,
             running: Vec::new(),
-            is_watched: true,
         }
-    }
-
-    /// Returns true if a handler may begin or be over at a hit.
-    pub(super) fn concerns(&self, hit: &Hit) -> bool {
-        let mut returns = self.running.iter().map(|running| running.returns_to);
-        returns.any(|at| at == hit.address) || self.addresses.contains(&hit.address)
-    }
-
-    /// The index of the handler that runs.
-    pub(super) fn running(&self) -> Option<usize> {
-        self.running.last().map(|running| running.handler)
     }
 
     /// The handler that begins at a hit.
@@ -68,9 +46,7 @@ impl<T> Handlers<T> {
 
     pub(super) fn begin(&mut self, handler: usize, sp: u32, kept: T, host: &mut dyn Host) {
         let returns_to = u64::from(word(sp + RETURN, host));
-        if !self.is_watched {
-            host.watch(Watch::Instruction(returns_to));
-        }
+        host.watch(Watch::Instruction(returns_to));
         self.running.push(Running {
             handler,
             sp,
@@ -91,7 +67,7 @@ impl<T> Handlers<T> {
         })?;
         let returns_to = ended.returns_to;
         let mut others = self.running.iter().map(|running| running.returns_to);
-        let is_wanted = self.is_watched || others.any(|at| at == returns_to);
+        let is_wanted = others.any(|at| at == returns_to);
         if !is_wanted && !self.addresses.contains(&returns_to) {
             host.unwatch(Watch::Instruction(returns_to));
         }

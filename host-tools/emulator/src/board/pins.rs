@@ -32,7 +32,7 @@ const F: u8 = 5;
 /// Chip select of the sensor, low active.
 pub const SENSOR_CS: PinId = PinId(D, 14);
 /// That of a finger's second part.
-pub const SENSOR_CS_2: PinId = PinId(D, 15);
+pub(crate) const SENSOR_CS_2: PinId = PinId(D, 15);
 /// The sensor's clock, MISO and MOSI, with SPI1's alternate function.
 pub(crate) const SENSOR_SPI: [PinId; 3] = [PinId(A, 5), PinId(A, 6), PinId(B, 5)];
 pub(crate) const SPI1_FUNCTION: u8 = 5;
@@ -42,30 +42,30 @@ pub(crate) const MOTION_CS: PinId = PinId(E, 4);
 pub(crate) const MOTION_SPI: [PinId; 3] = [PinId(E, 2), PinId(E, 5), PinId(E, 6)];
 pub(crate) const SPI4_FUNCTION: u8 = 5;
 /// Each rising edge is a step of the lever.
-pub const LEVER_STEP: PinId = PinId(E, 9);
+pub(crate) const LEVER_STEP: PinId = PinId(E, 9);
 pub(crate) const TIM1_FUNCTION: u8 = 1;
 /// High is down.
 pub const LEVER_DIR: PinId = PinId(E, 11);
 /// High gives current.
 pub const LEVER_ENABLE: PinId = PinId(E, 13);
 /// Magnitude of the stage's duty.
-pub const STAGE_PWM: PinId = PinId(C, 6);
+pub(crate) const STAGE_PWM: PinId = PinId(C, 6);
 /// TIM3's and TIM4's.
 pub(crate) const TIM3_4_FUNCTION: u8 = 2;
 /// High is towards higher positions.
-pub const STAGE_DIR: PinId = PinId(C, 7);
+pub(crate) const STAGE_DIR: PinId = PinId(C, 7);
 /// High switches the bridge on.
 pub const STAGE_ENABLE: PinId = PinId(C, 8);
 /// Lines A and B of the stage's encoder.
 pub(crate) const ENCODER: [PinId; 2] = [PinId(D, 12), PinId(D, 13)];
 /// Normally closed to ground; high is actuated, or a cut wire.
-pub const LEVER_TOP: PinId = PinId(F, 12);
+pub(crate) const LEVER_TOP: PinId = PinId(F, 12);
 /// As [`LEVER_TOP`].
-pub const E_STOP: PinId = PinId(F, 13);
+pub(crate) const E_STOP: PinId = PinId(F, 13);
 /// As [`LEVER_TOP`].
-pub const STAGE_LOWER: PinId = PinId(F, 14);
+pub(crate) const STAGE_LOWER: PinId = PinId(F, 14);
 /// As [`LEVER_TOP`].
-pub const STAGE_UPPER: PinId = PinId(F, 15);
+pub(crate) const STAGE_UPPER: PinId = PinId(F, 15);
 /// Clock and data of the handheld's display, with I2C1's alternate function.
 pub(crate) const DISPLAY_I2C: [PinId; 2] = [PinId(B, 8), PinId(B, 9)];
 pub(crate) const I2C1_FUNCTION: u8 = 4;
@@ -73,12 +73,12 @@ pub(crate) const I2C1_FUNCTION: u8 = 4;
 pub(crate) const BUZZER: PinId = PinId(C, 9);
 pub(crate) const TIM8_FUNCTION: u8 = 3;
 /// High is pressed.
-pub const BUTTON: PinId = PinId(C, 13);
+pub(crate) const BUTTON: PinId = PinId(C, 13);
 /// LD1 green, LD2 blue, LD3 red.
-pub const LEDS: [PinId; 3] = [PinId(B, 0), PinId(B, 7), PinId(B, 14)];
+pub(crate) const LEDS: [PinId; 3] = [PinId(B, 0), PinId(B, 7), PinId(B, 14)];
 
 /// Go / no-go: high while the last verification said "the same".
-pub const GO: PinId = PinId(C, 10);
+pub(crate) const GO: PinId = PinId(C, 10);
 
 /// Levels that resistors of the drivers give to pins that the chip leaves alone, so that nothing moves in a reset.
 pub(crate) const REST_LEVELS: [(PinId, bool); 10] = [

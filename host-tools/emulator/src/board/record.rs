@@ -27,7 +27,7 @@ pub struct Slide {
     /// Contact force when the stage began to move, N.
     pub force_n: f64,
     /// Mean contact force from then on, N.
-    pub force_mean_n: f64,
+    pub(crate) force_mean_n: f64,
     /// Largest contact force, N.
     pub force_max_n: f64,
     /// Mean speed of the steady part, mm/s; 0 if there is none.

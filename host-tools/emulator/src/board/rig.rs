@@ -196,7 +196,7 @@ impl Rig {
 
     /// Tells the truth recorder the speed that the next slides are to have, mm/s. Without it, their median speed
     /// counts.
-    pub fn expect_speed(&mut self, mm_s: f64) {
+    pub(crate) fn expect_speed(&mut self, mm_s: f64) {
         self.recorder.expect_speed(mm_s);
     }
 
@@ -397,7 +397,7 @@ impl Rig {
     }
 
     /// Disturbs the line to the host until a time: this share of the bytes, either way, has a wrong bit or is lost.
-    pub fn disturb_line(&mut self, share: f64, until_ns: u64, seed: u64) {
+    pub(crate) fn disturb_line(&mut self, share: f64, until_ns: u64, seed: u64) {
         self.line = Some(LineNoise::new(share, until_ns, seed));
     }
 

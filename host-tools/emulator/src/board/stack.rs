@@ -22,7 +22,7 @@ const WINDOW: u32 = 2048;
 
 /// The depth of a handler.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct StackLevel {
+pub(crate) struct StackLevel {
     /// Its name in the ELF.
     pub name: String,
     /// Its address.
@@ -36,7 +36,7 @@ pub struct StackLevel {
 
 impl StackLevel {
     /// A handler of which nothing is known yet.
-    pub fn new(name: String, address: u64) -> Self {
+    pub(crate) fn new(name: String, address: u64) -> Self {
         Self {
             name,
             address,
@@ -49,7 +49,7 @@ impl StackLevel {
 
 /// The stack of an image, and its handlers.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct StackLayout {
+pub(crate) struct StackLayout {
     /// The end of the variables.
     pub bottom: u32,
     /// The stack pointer before the first instruction.
@@ -63,7 +63,7 @@ impl StackLayout {
     ///
     /// # Errors
     /// [`Error::Read`], [`Error::Elf`], and [`Error::Symbol`] if it was not.
-    pub fn of(path: &Path) -> Result<Self, Error> {
+    pub(crate) fn of(path: &Path) -> Result<Self, Error> {
         let elf = std::fs::read(path).map_err(|source| Error::Read {
             path: path.into(),
             source,
@@ -117,7 +117,7 @@ impl StackLayout {
 
 /// The use of the stack.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct StackUse {
+pub(crate) struct StackUse {
     /// The handlers.
     pub levels: Vec<StackLevel>,
     /// Most bytes that were ever in use.
@@ -130,7 +130,7 @@ pub struct StackUse {
 
 impl StackUse {
     /// Bytes that are in use if every handler interrupts every other where that is deepest.
-    pub fn bound(&self) -> u32 {
+    pub(crate) fn bound(&self) -> u32 {
         let levels = self.levels.iter().filter(|level| level.runs > 0);
         self.thread + levels.map(|level| level.deepest + FRAME).sum::<u32>()
     }

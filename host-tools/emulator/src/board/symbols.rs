@@ -1,18 +1,6 @@
-//! Functions and variables of an ELF, and where its code is.
+//! Functions and variables of an ELF.
 
-use std::ops::Range;
-
-use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionKind};
-
-/// Addresses of code.
-pub(super) fn code(elf: &[u8]) -> object::Result<Vec<Range<u64>>> {
-    let file = object::File::parse(elf)?;
-    let code = file
-        .sections()
-        .filter(|section| section.kind() == SectionKind::Text);
-    let ranges = code.map(|section| section.address()..section.address() + section.size());
-    Ok(ranges.collect())
-}
+use object::{Object as _, ObjectSymbol as _};
 
 /// Functions and variables, by their paths: compilers mangle them in more than one way.
 pub(super) fn symbols(elf: &[u8]) -> object::Result<Vec<(String, u64, u64)>> {

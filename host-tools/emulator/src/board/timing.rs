@@ -10,15 +10,15 @@ const DUTY: u64 = 0x4000_0434;
 
 /// The measured punctuality.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Timing {
+pub(crate) struct Timing {
     /// Commands that ended.
     pub commands: u64,
     /// The latest end of one after its slot began, us.
-    pub command_us: f64,
+    pub(crate) command_us: f64,
     /// Periods of the servo.
-    pub servo_periods: u64,
+    pub(crate) servo_periods: u64,
     /// The longest time between two of them, us.
-    pub servo_gap_us: f64,
+    pub(crate) servo_gap_us: f64,
     servo_ns: Option<u64>,
 }
 

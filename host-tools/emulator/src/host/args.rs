@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 use tactus_core::sensor::FingerName;
 use tactus_lab::eval::evaluate::Method;
@@ -29,7 +28,8 @@ impl Firmware {
             path: self.elf.clone(),
             source,
         })?;
-        let sha256 = hex_sha256(&elf);
+        let digest = Sha256::digest(elf);
+        let sha256: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
         let named = format!("ELF {}\nSHA-256 {sha256}", self.elf.display());
         if on_stdout {
             println!("{named}");
@@ -40,12 +40,6 @@ impl Firmware {
     }
 }
 
-/// SHA-256 in hexadecimal.
-pub fn hex_sha256(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 /// The reader of a result.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
@@ -53,49 +47,6 @@ pub enum Format {
     Text,
     /// For programs.
     Json,
-}
-
-/// The reason why a result was not written.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {source}", path.display())]
-pub struct WriteError {
-    /// The file.
-    pub path: PathBuf,
-    /// The reason.
-    pub source: std::io::Error,
-}
-
-/// The place of a result.
-#[derive(Args)]
-pub struct Output {
-    /// A table for people, or one JSON object for programs
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
-    /// File for the result instead of the terminal
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-}
-
-impl Output {
-    /// Writes the result in its format.
-    pub fn write(
-        &self,
-        text: impl FnOnce() -> String,
-        json: impl FnOnce() -> Value,
-    ) -> Result<(), WriteError> {
-        let result = match self.format {
-            Format::Text => text(),
-            Format::Json => format!("{}\n", json()),
-        };
-        let Some(path) = &self.out else {
-            print!("{result}");
-            return Ok(());
-        };
-        std::fs::write(path, result).map_err(|source| WriteError {
-            path: path.clone(),
-            source,
-        })
-    }
 }
 
 /// The board, and the texture under its finger.

@@ -60,7 +60,7 @@ impl OnTheLine {
     }
 
     /// Goes on to the board's time: to be called every ms.
-    pub fn look(&mut self, board: &mut Emulator) {
+    pub(crate) fn look(&mut self, board: &mut Emulator) {
         let now_ms = board.now_ns() / 1_000_000;
         while self.now_ms < now_ms {
             self.now_ms += 1;
@@ -87,7 +87,7 @@ impl OnTheLine {
 /// An arm behind a TCP port. A line "ALONG UP" commands velocities, mm/s; they hold until the next one, or until the
 /// connection ends. Every 10 ms of the board's time the port sends "MS X HEIGHT ALONG": the time, the finger's place on
 /// the sample and its height over it, mm, and its speed along it, mm/s, by the arm's encoders.
-pub struct ArmPort {
+pub(crate) struct ArmPort {
     listener: TcpListener,
     client: Option<(BufReader<TcpStream>, String)>,
     said_ms: u64,
@@ -101,7 +101,7 @@ impl ArmPort {
     ///
     /// # Errors
     /// The port cannot be had.
-    pub fn bind(port: u16) -> std::io::Result<Self> {
+    pub(crate) fn bind(port: u16) -> std::io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", port))?;
         listener.set_nonblocking(true)?;
         Ok(Self {
@@ -115,12 +115,12 @@ impl ArmPort {
     ///
     /// # Errors
     /// The system does not say.
-    pub fn address(&self) -> std::io::Result<std::net::SocketAddr> {
+    pub(crate) fn address(&self) -> std::io::Result<std::net::SocketAddr> {
         self.listener.local_addr()
     }
 
     /// Takes the received commands, and sends the arm's state: to be called every ms. An arm without a driver stands.
-    pub fn look(&mut self, board: &mut Emulator) {
+    pub(crate) fn look(&mut self, board: &mut Emulator) {
         if let Ok((stream, _)) = self.listener.accept()
             && stream.set_nonblocking(true).is_ok()
             && stream.set_nodelay(true).is_ok()

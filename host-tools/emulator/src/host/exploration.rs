@@ -1,12 +1,10 @@
 //! Explorations by the firmware, compared with the rig's truth and with the PC that follows them.
 
-use std::collections::BTreeMap;
-
 use serde_json::{Value, json};
 use tactus_core::dsp::Plan;
-use tactus_core::features::{Movement, Property, PropertySet};
-use tactus_core::table::{Action, Contents, Table, TableError, white};
-use tactus_core::wire::{Command, Counts, Event, Identify, Report, SlideReport, Verdict};
+use tactus_core::features::{Movement, PropertySet};
+use tactus_core::table::{Table, TableError};
+use tactus_core::wire::{Command, Counts, Event, Identify, Report, Verdict};
 use tactus_lab::eval::show::count;
 use tactus_link::Request;
 use tactus_link::follow::{ALLOWED, Agreement, Follower};
@@ -23,13 +21,13 @@ const ASKED_AT_BOOT: u64 = 16;
 const EXPLORATION_S: f64 = 600.0;
 
 /// Largest relative error of a slide's force ...
-pub const FORCE_SHARE: f64 = 0.05;
+pub(crate) const FORCE_SHARE: f64 = 0.05;
 /// ... unless it is less than a count of P_DC, N.
-pub const FORCE_N: f64 = 0.0115;
+pub(crate) const FORCE_N: f64 = 0.0115;
 /// Largest relative error of a slide's speed.
 pub const SPEED_SHARE: f64 = 0.01;
 /// Largest deviation of a slot from its grid, us.
-pub const JITTER_US: f64 = 2.0;
+pub(crate) const JITTER_US: f64 = 2.0;
 
 /// Reasons why there is no exploration to judge.
 #[derive(Debug, thiserror::Error)]
@@ -52,35 +50,6 @@ impl From<board::Error> for ExploreError {
     }
 }
 
-/// The features of a slide, beside the learned ones of the true texture.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Step {
-    /// The movement.
-    pub movement: Option<Movement>,
-    /// The action.
-    pub action: Action,
-    /// The observed properties with their values; all where the action looks at everything.
-    pub observed: Vec<(Property, f32)>,
-    /// Distance of the observation from the learned mean of the true texture, in standard deviations: the root of the
-    /// mean square over all observed features, about 1 if it is that texture. `None` if nothing was learned.
-    pub distance_sd: Option<f32>,
-    /// Posterior probability of the true texture.
-    pub probability: f32,
-    /// The most probable other texture.
-    pub other: Option<Other>,
-}
-
-/// Another texture than the true one.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Other {
-    /// Its name.
-    pub name: String,
-    /// Its posterior probability.
-    pub probability: f32,
-    /// See [`Step::distance_sd`].
-    pub distance_sd: Option<f32>,
-}
-
 /// An exploration, as the firmware reported it and in truth.
 #[derive(Clone, Debug)]
 pub struct Exploration {
@@ -93,11 +62,11 @@ pub struct Exploration {
     /// Slides that the probe has learned from by itself.
     pub learned: u8,
     /// From power-up to the end, virtual seconds.
-    pub virtual_s: f64,
+    pub(crate) virtual_s: f64,
     /// The ground truth of every slide, and its movement.
     pub slides: Vec<(Movement, Slide)>,
-    /// The features of every slide that counted.
-    pub steps: Vec<Step>,
+    /// Slides that the firmware reported.
+    pub observed: usize,
     /// The firmware's counters.
     pub counts: Counts,
     /// Sample commands that the sensor got, before and after the firmware's counters were read.
@@ -107,7 +76,7 @@ pub struct Exploration {
     /// The PC's agreement.
     pub agreement: Agreement,
     /// The parts that the PC could not compare.
-    pub not_followed: Vec<String>,
+    pub(crate) not_followed: Vec<String>,
     /// Reports that came damaged or not at all.
     pub lost_reports: u64,
     /// Counts of the recordings played, all 0 without any.
@@ -129,7 +98,7 @@ pub fn explore(
     let table = Table::read(table)?;
     let mut follower = Follower::new(table, PropertySet::ALL, &identify, &plan)?;
     let mut not_followed = Vec::new();
-    let mut steps = Vec::new();
+    let mut observed = 0;
     let mut slides = Vec::new();
     let mut movement = None;
     let before = talk.board().rig().slides().len();
@@ -147,12 +116,7 @@ pub fn explore(
                     movement = Some(*chosen);
                     board.rig().expect_speed(chosen.speed_mm_s().into());
                 }
-                Event::SlideReport {
-                    action,
-                    observed,
-                    posterior,
-                    ..
-                } => steps.push(step(table, truth, *action, observed, posterior)),
+                Event::SlideReport { .. } => observed += 1,
                 _ => {}
             }
         } else if let Some(movement) = movement {
@@ -176,7 +140,7 @@ pub fn explore(
         learned: found.learned,
         virtual_s: board.now_ns() as f64 * 1e-9,
         slides,
-        steps,
+        observed,
         counts: status.counts,
         commands,
         resets: board.resets()?.len(),
@@ -186,79 +150,6 @@ pub fn explore(
         played,
         violations: board.violations()?,
     })
-}
-
-fn step(
-    table: Table<'_>,
-    truth: &str,
-    action: Action,
-    observed: &SlideReport,
-    posterior: &[f32],
-) -> Step {
-    let number = table.find(truth);
-    let others = posterior.iter().zip(0..);
-    let other = others
-        .filter(|(_, texture)| Some(*texture) != number)
-        .max_by(|a, b| a.0.total_cmp(b.0));
-    let distance_sd = |texture| distance_sd(table, texture, action, observed);
-    let looked_at = |property: &Property| action.property.is_none_or(|only| only == *property);
-    let properties = observed.properties();
-    Step {
-        movement: table.movement(action.movement),
-        action,
-        observed: Property::ALL
-            .into_iter()
-            .filter(looked_at)
-            .filter_map(|property| Some((property, properties.get(property)?)))
-            .collect(),
-        distance_sd: number.and_then(distance_sd),
-        probability: number
-            .and_then(|number| posterior.get(usize::from(number)).copied())
-            .unwrap_or(0.0),
-        other: other.map(|(probability, texture)| Other {
-            name: table.name(texture).unwrap_or("?").to_owned(),
-            probability: *probability,
-            distance_sd: distance_sd(texture),
-        }),
-    }
-}
-
-fn distance_sd(
-    table: Table<'_>,
-    texture: u16,
-    action: Action,
-    observed: &SlideReport,
-) -> Option<f32> {
-    let squares: Vec<f32> = match table.contents() {
-        Contents::Fused(set, features) => {
-            if table.trials(texture, action.movement) == 0 {
-                return None;
-            }
-            let vector = observed.observation().vector(set, features.into())?;
-            let observed = table.whiten(action.movement, &vector)?;
-            let learned = table.white_mean(texture, action.movement);
-            let apart = observed
-                .into_iter()
-                .zip(learned)
-                .map(|(z, m)| white(z) - white(m));
-            apart.map(|sd| sd * sd).collect()
-        }
-        Contents::Gaussians(measured) => measured
-            .iter()
-            .filter(|property| action.property.is_none_or(|only| only == *property))
-            .map(|property| {
-                let property_of = Action {
-                    property: Some(property),
-                    ..action
-                };
-                let learned = table.gaussian(texture, property_of)?;
-                let sd = (observed.properties().get(property)? - learned.mean) / learned.sd;
-                Some(sd * sd)
-            })
-            .collect::<Option<_>>()?,
-    };
-    let mean = squares.iter().sum::<f32>() / squares.len() as f32;
-    mean.is_finite().then(|| mean.sqrt())
 }
 
 /// Largest error of a slide's force: N, relative, and true if it is too large.
@@ -294,7 +185,7 @@ impl Exploration {
     }
 
     /// Largest error of a slide's force: N, and relative.
-    pub fn force_error(&self) -> (f64, f64) {
+    pub(crate) fn force_error(&self) -> (f64, f64) {
         let (newtons, share, _) = force_error(&self.slides);
         (newtons, share)
     }
@@ -314,7 +205,7 @@ impl Exploration {
     }
 
     /// Largest deviation of a slot from its grid, us.
-    pub fn jitter_us(&self) -> f64 {
+    pub(crate) fn jitter_us(&self) -> f64 {
         let jitters = self.slides.iter().map(|(_, slide)| slide.slot_jitter_us);
         jitters.fold(0.0, f64::max)
     }
@@ -328,7 +219,7 @@ impl Exploration {
     }
 
     /// Largest difference of a property or of the signal it comes from.
-    pub fn features_difference(&self) -> f32 {
+    pub(crate) fn features_difference(&self) -> f32 {
         self.agreement.properties.max(self.agreement.signal)
     }
 
@@ -356,14 +247,13 @@ impl Exploration {
             check(false, format!("not allowed by the chip: {violation}"));
         }
         let counts = self.counts;
-        check(
-            counts.lost_samples == 0,
-            format!("{} lost", count(counts.lost_samples, "sample")),
-        );
-        check(
-            counts.late_slots == 0,
-            format!("{} late", count(counts.late_slots, "slot")),
-        );
+        let none = [
+            (counts.lost_samples, "sample", "lost"),
+            (counts.late_slots, "slot", "late"),
+        ];
+        for (number, what, how) in none {
+            check(number == 0, format!("{} {how}", count(number, what)));
+        }
         check(
             self.missed_slots() as u64 <= u64::from(counts.late_slots),
             format!(
@@ -398,11 +288,11 @@ impl Exploration {
             ),
         );
         check(
-            !self.slides.is_empty() && self.steps.len() == usize::from(self.found.slides),
+            !self.slides.is_empty() && self.observed == usize::from(self.found.slides),
             format!(
                 "{} made, {} observed, {} counted",
                 count(self.slides.len() as u64, "slide"),
-                self.steps.len(),
+                self.observed,
                 self.found.slides
             ),
         );
@@ -418,90 +308,22 @@ impl Exploration {
 
     /// For programs: everything in the units of its name.
     pub fn json(&self) -> Value {
-        let (force_n, force_share) = self.force_error();
-        let steps = self.steps.iter().map(|step| {
-            json!({
-                "movement": step.movement.map(|movement| movement.to_string()),
-                "looked_at": step.action.what(),
-                "observed": step.observed.iter().map(|(p, x)| (p.name(), *x)).collect::<BTreeMap<_, _>>(),
-                "distance_sd": step.distance_sd,
-                "probability_true": step.probability,
-                "other": step.other.as_ref().map(|other| &other.name),
-                "distance_sd_other": step.other.as_ref().map(|other| other.distance_sd),
-                "probability_other": step.other.as_ref().map(|other| other.probability),
-            })
-        });
-        let mut json = json!({
+        json!({
             "texture_true": self.truth,
             "texture_identified": self.found.name.as_str(),
-            "right": self.right(),
             "probability": self.found.probability,
             "sure": self.found.sure,
             "unknown": self.found.unknown,
-            "unknown_log_odds": self.found.log_odds,
-            "slides_learned_by_itself": self.learned,
             "slides": self.found.slides,
             "virtual_seconds": self.virtual_s,
-            "lost_samples": self.counts.lost_samples,
-            "late_slots": self.counts.late_slots,
-            "parity_errors": self.counts.parity_errors,
-            "missed_slots_true": self.missed_slots(),
-            "resets": self.resets,
             "silicon_violations": self.violations.len(),
             "violations": self.violations.iter().map(ToString::to_string).collect::<Vec<_>>(),
-            "force_error_max": force_share,
-            "force_error_max_n": force_n,
             "force_errors": self.force_errors(),
             "lost": u64::from(self.counts.lost_samples) + u64::from(self.counts.lost_reports) + self.lost_reports,
             "late": self.counts.late_slots,
             "damaged": self.counts.parity_errors + self.counts.error_frames,
-            "speed_error_max": self.speed_error(),
-            "slot_jitter_us": self.jitter_us(),
-            "features_difference": number(self.features_difference()),
-            "posterior_difference": number(self.agreement.posterior),
-            "other_choices": self.agreement.other_choices.len(),
             "follows": self.follows(),
-            "bars_missed": self.missed(),
-            "log": steps.collect::<Vec<_>>(),
-        });
-        if self.played != PlayCounts::default() {
-            json["played"] = json!({
-                "recordings": self.played.slides,
-                "samples_clipped": self.played.clipped,
-                "samples_beyond_the_end": self.played.over,
-                "movements": 1,
-                "seconds_used": "3 of 5",
-            });
-        }
-        json
-    }
-
-    /// Time and property of each step of the exploration, a line for each slide.
-    pub fn log(&self) -> Vec<String> {
-        let lines = self.steps.iter().zip(1..).map(|(step, number)| {
-            let movement = step.movement.map_or("?".into(), |m| m.to_string());
-            let observed: Vec<String> = step
-                .observed
-                .iter()
-                .map(|(p, x)| format!("{p} {x:.3}"))
-                .collect();
-            let away = |sd: Option<f32>| {
-                sd.map_or("never measured".into(), |sd| format!("{sd:.1} sd away"))
-            };
-            let other = step.other.as_ref().map_or("no other".into(), |other| {
-                let p = other.probability * 100.0;
-                format!("{} {p:.1} % ({})", other.name, away(other.distance_sd))
-            });
-            format!(
-                "slide {number}: {} at {movement}, observed {}; {} {:.1} % ({}), {other}",
-                step.action.what(),
-                observed.join(", "),
-                self.truth,
-                step.probability * 100.0,
-                away(step.distance_sd),
-            )
-        });
-        lines.collect()
+        })
     }
 
     /// The PC's agreement, for people.
@@ -519,14 +341,5 @@ impl Exploration {
             agreement.other_choices.len(),
             agreement.choices
         )
-    }
-}
-
-/// JSON has no infinity; a difference that has no value must not read as none.
-fn number(difference: f32) -> Value {
-    if difference.is_finite() {
-        json!(difference)
-    } else {
-        json!("infinite")
     }
 }

@@ -3,7 +3,7 @@
 use tactus_core::wire::{Event, Phase};
 
 /// The times of one exploration, ns since power-up.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Milestones {
     ready_ns: Option<u64>,
     commanded_ns: Option<u64>,
@@ -38,48 +38,20 @@ impl Milestones {
     }
 
     /// Returns the time from power-up to ready, s.
-    pub fn seconds_to_ready(&self) -> Option<f64> {
-        self.ready_ns.map(seconds)
+    pub(crate) fn seconds_to_ready(&self) -> Option<f64> {
+        Some(self.ready_ns? as f64 * 1e-9)
     }
 
     /// Returns the time from the command, or the first touch, to the verdict, s.
     pub fn seconds_to_verdict(&self) -> Option<f64> {
-        Some(seconds(self.verdict_ns?.checked_sub(self.commanded_ns?)?))
+        Some(self.verdict_ns?.checked_sub(self.commanded_ns?)? as f64 * 1e-9)
     }
 
     /// Says both times, if there are both; `since` names the beginning of the second.
     pub fn sentence(&self, since: &str) -> String {
-        match (self.seconds_to_ready(), self.seconds_to_verdict()) {
-            (Some(ready), Some(verdict)) => {
-                format!("Ready after {ready:.1} s, verdict {verdict:.1} s after the {since}. ")
-            }
-            _ => String::new(),
-        }
-    }
-}
-
-fn seconds(ns: u64) -> f64 {
-    ns as f64 * 1e-9
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_begin_with_power_and_with_the_command() {
-        const S: u64 = 1_000_000_000;
-        let mut times = Milestones::default();
-        times.verdict(S);
-        assert_eq!(times, Milestones::default());
-        for ready_s in [4, 9] {
-            times.hear(ready_s * S, &Event::Phase(Phase::Ready));
-        }
-        times.begin(20 * S);
-        for verdict_s in [34, 40] {
-            times.verdict(verdict_s * S);
-        }
-        assert_eq!(times.seconds_to_ready(), Some(4.0));
-        assert_eq!(times.seconds_to_verdict(), Some(14.0));
+        let times = self.seconds_to_ready().zip(self.seconds_to_verdict());
+        times.map_or_else(String::new, |(ready, verdict)| {
+            format!("Ready after {ready:.1} s, verdict {verdict:.1} s after the {since}. ")
+        })
     }
 }

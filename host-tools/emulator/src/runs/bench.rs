@@ -1,13 +1,13 @@
-//! `cargo xtask bench` asks what the kernels cost: the bench image is given its work on the emulated chip, the instructions
-//! that it counted are read, and the plain kernels do the same on this PC.
+//! `cargo xtask bench` asks what the kernels cost: the bench image is given its work on the emulated chip, the
+//! instructions that it counted are read, and the plain kernels do the same on this PC.
 
 mod counter;
-pub mod cycles;
 pub(crate) mod error;
 mod gates;
 mod inputs;
 mod on_the_rig;
 mod row;
+pub mod slowed;
 #[path = "../../../../firmware/src/bench/workload.rs"]
 pub mod workload;
 
@@ -68,7 +68,7 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         .as_ref()
         .filter(|_| args.finger != FingerName::Biotac)
     {
-        let rows = on_the_rig(rig, args.finger, None)?;
+        let rows = on_the_rig(rig, args.finger)?;
         if text {
             print(&rows, "one of the simulated rig");
         } else {
@@ -76,21 +76,14 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         }
         return Ok(rows.iter().all(Row::ok));
     }
-    let mut bench = Bench::start(&args.firmware.elf, false)?;
+    let mut bench = Bench::start(&args.firmware.elf)?;
     extremes(&mut bench)?;
-    if text {
-        bench = Bench::start(&args.firmware.elf, true)?;
-    }
     let (samples, source) = slide()?;
     let mut rows = kernels(&mut bench, &samples)?;
     let mut slow = None;
     if let Some(rig) = &args.rig {
-        let cycles = text.then(|| cycles::trace(rig, u64::MAX)).transpose()?;
-        rows.extend(on_the_rig(rig, args.finger, cycles.as_ref())?);
-        if let Some(cycles) = cycles {
-            let by = cycles::RESERVE * cycles.worst_ratio();
-            slow = Some((cycles, cycles::slowed(rig, by)));
-        }
+        rows.extend(on_the_rig(rig, args.finger)?);
+        slow = Some(slowed::slowed(rig, slowed::WORST_RATIO * slowed::RESERVE));
         let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
         if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
             let (kernel, what) = ((*name).to_owned(), "it has a gate and was not counted");
@@ -99,8 +92,8 @@ fn count(args: &Args) -> Result<bool, BenchError> {
     }
     if text {
         print(&rows, source);
-        if let Some((cycles, slowed)) = &slow {
-            cycles::print(cycles, slowed);
+        if let Some(slowed) = &slow {
+            slowed::print(slowed);
         }
     } else {
         println!("{}", Value::from_iter(rows.iter().map(Row::json)));
@@ -110,7 +103,8 @@ fn count(args: &Args) -> Result<bool, BenchError> {
     if !different.is_empty() {
         return Err(BenchError::Different(different));
     }
-    Ok(rows.iter().all(Row::ok))
+    let in_time = slow.is_none_or(|slowed| slowed::missed(&slowed).is_empty());
+    Ok(in_time && rows.iter().all(Row::ok))
 }
 
 /// A kernel that is to be counted: its work, and what it is held against.
@@ -162,7 +156,6 @@ impl<'a> Kernel<'a> {
             kernel: self.name,
             unit: self.unit,
             instructions: counted.instructions as f64 / units,
-            cycles: counted.cycles.map(|cycles| cycles / units),
             cmsis: self.cmsis,
             floor: self.floor,
             equal: counted.equal,

@@ -1,33 +1,48 @@
 //! The power is cut while the real firmware stores something: what it makes of the flash that is left.
 //!
-//! The firmware stores once without a cut, and every word that it programs and every sector that it erases is noted. For a
-//! cut, the flash is made as it is after a part of them, with the last one torn, and the firmware boots on it: it must hold
-//! the state from before or the one from after, and say so before it has found its switches.
-
-pub(crate) mod held;
-mod outcome;
+//! The firmware stores once without a cut, and every word that it programs and every sector that it erases is noted.
+//! For a cut, the flash is made as it is after a part of them, with the last one torn, and the firmware boots on it: it
+//! must hold the state from before or the one from after, and say so before it has found its switches.
 
 use std::path::Path;
 
+use clap::Args as Arguments;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::table::Name;
-use tactus_core::wire::{Event, Identify, Reset};
+use tactus_core::wire::{Event, Identify, Reset, Verdict};
 use tactus_lab::sim::collection::Collection;
 use tactus_link::{ReadTable, Request};
 use tactus_world::world::{Setup, World};
 
-use self::held::{CutError, Held, Left, Operation, judge};
-pub(crate) use self::outcome::{Cuts, Outcome};
-
-use crate::board::{FlashWrite, Options};
-use crate::host::exploration::{Exploration, explore};
+use super::error::RunError;
+use crate::board::{self, FlashWrite, Options};
+use crate::host::args::Firmware;
+use crate::host::exploration::{Exploration, ExploreError, explore};
 use crate::host::power_cut::{Cut, Torn, left_by};
+use crate::host::progress;
 use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
-use crate::host::under_finger::{self, FirmwareData, Unknown};
+use crate::host::under_finger::{self, FirmwareData, UnderFingerError, Unknown};
+
+/// Cuts the power at every word that the firmware programs when a texture is labelled and when the probe learns by
+/// itself, and at seeded moments of an update that turns a page of its settings.
+///
+/// It boots on what is left of the flash, in which the last word or erase is torn, and must hold the old or the new;
+/// where it repairs the flash first, the power is cut in that too. The exit code is 1 if a cut loses anything.
+#[derive(Arguments)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    firmware: Firmware,
+    /// Cuts of the update that turns a page
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    cuts: usize,
+    /// Another seed is another world and other cuts
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
 
 /// The texture under the finger, which the table has.
 const TEXTURE: u8 = 47;
@@ -46,16 +61,98 @@ const TRIALS: u64 = 100;
 /// After so many cuts of an operation the probe homes and identifies as well.
 const PROBED: usize = 2;
 
+/// Why there are no cuts to judge.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CutError {
+    #[error(transparent)]
+    Talk(#[from] TalkError),
+    #[error(transparent)]
+    Explore(#[from] ExploreError),
+    #[error(transparent)]
+    Known(#[from] UnderFingerError),
+    #[error("the firmware did not {0}: nothing to cut")]
+    Nothing(&'static str),
+    #[error("{0}: the noted writes do not give the flash that the firmware left")]
+    Noted(&'static str),
+    #[error("{0}: without a cut the firmware does not keep what it held: {1:?}, {2:?}")]
+    Kept(&'static str, Box<Held>, Box<Held>),
+    #[error("it says that it started by {0:?}")]
+    Started(Reset),
+    #[error("no table in {0} virtual s")]
+    NoTable(f64),
+    #[error("neither old nor new: {0:?}")]
+    Neither(Box<Held>),
+    #[error("it identifies {0:?}")]
+    Identifies(Box<Verdict>),
+}
+
+impl From<board::Error> for CutError {
+    fn from(why: board::Error) -> Self {
+        Self::Talk(why.into())
+    }
+}
+
+/// What the firmware holds, by its own account.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Held {
+    /// Checksum and bytes of the table in force, with what the probe has learned by itself.
+    table: (u32, u32),
+    /// Its textures.
+    textures: u16,
+    /// It came with the firmware.
+    factory: bool,
+    /// Constants of the rig.
+    calibration: Vec<u8>,
+    /// Work that the skin has seen, mJ, and that part of it that wears.
+    skin_mj: (u32, u32),
+}
+
+/// What is left by a cut.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Left {
+    /// The state from before.
+    Old,
+    /// One of several records is stored.
+    Between,
+    /// The state from after.
+    New,
+}
+
+/// Which of the states, the oldest first, was found; `None` is neither.
+fn judge(states: &[Held], found: &Held) -> Option<Left> {
+    let last = states.len().checked_sub(1)?;
+    // where nothing changed, it is old and new
+    match states.iter().rposition(|state| state == found)? {
+        at if at == last => Some(Left::New),
+        0 => Some(Left::Old),
+        _ => Some(Left::Between),
+    }
+}
+
+/// Something that the firmware stores.
+#[derive(Clone, Debug)]
+struct Operation {
+    /// What it is.
+    name: &'static str,
+    /// The store before it.
+    before: Vec<u8>,
+    /// What the firmware does to it.
+    writes: Vec<FlashWrite>,
+    /// What may be held after a cut, the oldest first.
+    states: Vec<Held>,
+}
+
 /// What is cut, and in what world.
 #[derive(Clone, Debug)]
-pub(crate) struct Prepared {
-    /// A label from the user and an update by the probe itself, to be cut at every word, and an update that turns a page.
-    pub(crate) operations: Vec<Operation>,
+struct Prepared {
+    /// A label from the user and an update by the probe itself, to be cut at every word, and an update that turns a
+    /// page.
+    operations: Vec<Operation>,
     unknown: Unknown,
 }
 
 /// Has the firmware store all that is to be cut, each once and whole; `each` hears what it does.
-pub(crate) fn prepare(
+fn prepare(
     elf: &Path,
     seed: u64,
     mut each: impl FnMut(&'static str),
@@ -99,8 +196,8 @@ pub(crate) fn prepare(
     })
 }
 
-/// The same with the finger as high as it may be when the power comes: it was lifted when it was cut, and every boot lifts
-/// it first.
+/// The same with the finger as high as it may be when the power comes: it was lifted when it was cut, and every boot
+/// lifts it first.
 fn lifted(unknown: Unknown) -> Unknown {
     let setups = (0..TRIALS).map(|trial_seed| Setup {
         trial_seed,
@@ -294,59 +391,65 @@ fn tasks(operations: &[Operation], turned: usize, seed: u64) -> Vec<Task> {
     tasks
 }
 
-/// How many cuts [`run`] makes.
-pub(crate) fn count(prepared: &Prepared, turned: usize) -> usize {
-    tasks(&prepared.operations, turned, 0).len()
-}
-
-/// Makes the cuts, as many at once as there are cores; `done` hears of each. `turned` of them are seeded ones of the sector
-/// change.
-///
-/// # Errors
-/// [`CutError::Kept`]: an operation is not kept without a cut.
-pub(crate) fn run(
-    elf: &Path,
-    prepared: &Prepared,
-    turned: usize,
-    seed: u64,
-    done: impl Fn() + Sync,
-) -> Result<Cuts, CutError> {
+/// Prepares and makes the cuts; true if none loses anything.
+pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
+    let elf = &args.firmware.elf;
+    args.firmware.show(false)?;
+    let bar = progress::spinner("");
+    let prepared = prepare(elf, args.seed, |what| bar.set_message(what))?;
+    bar.finish_and_clear();
     let Prepared {
         operations,
         unknown,
-    } = prepared;
+    } = &prepared;
     for operation in operations {
         kept(elf, unknown, operation)?;
     }
-    let outcome = |operation: &Operation| Outcome {
-        name: operation.name,
-        writes: operation.writes.len(),
-        erases: erases(&operation.writes).count(),
-        ..Outcome::default()
-    };
-    let mut outcomes: Vec<Outcome> = operations.iter().map(outcome).collect();
-    let made = tasks(operations, turned, seed).into_par_iter().map(|task| {
+    let tasks = tasks(operations, args.cuts, args.seed);
+    let bar = progress::bar("cutting", tasks.len() as u64, ", {eta} left");
+    let made = tasks.into_par_iter().map(|task| {
         let results = one(elf, unknown, &operations[task.operation], &task);
-        done();
+        bar.inc(1);
         (task, results)
     });
-    for (task, results) in made.collect::<Vec<_>>() {
-        let outcome = &mut outcomes[task.operation];
-        outcome.in_recovery += results.len() - 1;
-        outcome.probed += usize::from(task.probed && results[0].is_ok());
-        for result in results {
-            match result {
-                Ok(Left::Old) => outcome.old += 1,
-                Ok(Left::Between) => outcome.between += 1,
-                Ok(Left::New) => outcome.new += 1,
-                Err(why) => outcome.wrong.push(format!("{:?}: {why}", task.cut)),
-            }
+    let made: Vec<_> = made.collect();
+    bar.finish_and_clear();
+    let (mut all, mut lost) = (0, 0);
+    for (number, operation) in operations.iter().enumerate() {
+        let of = made.iter().filter(|(task, _)| task.operation == number);
+        let results: Vec<_> = of
+            .flat_map(|(task, results)| results.iter().map(|result| (task.cut, result)))
+            .collect();
+        let count = |left| {
+            results
+                .iter()
+                .filter(|(_, r)| r.as_ref().ok() == Some(&left))
+                .count()
+        };
+        println!(
+            "  {}, {} writes: {} cuts left {} old, {} between, {} new",
+            operation.name,
+            operation.writes.len(),
+            results.len(),
+            count(Left::Old),
+            count(Left::Between),
+            count(Left::New)
+        );
+        for (cut, why) in results
+            .iter()
+            .filter_map(|(cut, r)| Some((cut, r.as_ref().err()?)))
+        {
+            println!("  WRONG: {cut:?}: {why}");
+            lost += 1;
         }
+        all += results.len();
     }
-    Ok(Cuts {
-        outcomes,
-        planted_seen: planted_is_seen(elf, prepared),
-    })
+    let planted = planted_is_seen(elf, &prepared);
+    if !planted {
+        println!("  WRONG: a flash that was erased before it was copied is taken for a good one");
+    }
+    println!("{all} cuts, {lost} of them lost something");
+    Ok(lost == 0 && planted)
 }
 
 /// Without a cut, what was held before and afterwards is held after a restart.
@@ -446,26 +549,33 @@ fn planted_is_seen(elf: &Path, prepared: &Prepared) -> bool {
 mod tests {
     use super::*;
 
+    fn held(table: u32, skin: u32) -> Held {
+        Held {
+            table: (table, 100),
+            textures: 4,
+            factory: false,
+            calibration: vec![1],
+            skin_mj: (skin, 0),
+        }
+    }
+
     #[test]
-    fn every_word_is_cut_and_the_erase_of_a_sector_change_often() {
-        let program = |at| FlashWrite::Program { at, word: 0 };
-        let mut writes: Vec<FlashWrite> = (0..50).map(|n| program(4 * n)).collect();
-        let operation = |name, writes: &[FlashWrite]| Operation {
-            name,
-            before: Vec::new(),
-            writes: writes.to_vec(),
-            states: Vec::new(),
+    fn new_but_half_is_wrong() {
+        let states = [held(1, 1), held(1, 2), held(2, 2)];
+        assert_eq!(judge(&states, &held(1, 1)), Some(Left::Old));
+        assert_eq!(judge(&states, &held(1, 2)), Some(Left::Between));
+        assert_eq!(judge(&states, &held(2, 2)), Some(Left::New));
+        // what is stored last is there, and what comes before is not
+        assert_eq!(judge(&states, &held(2, 1)), None);
+        let uncalibrated = Held {
+            calibration: vec![0],
+            ..held(2, 2)
         };
-        let teach = operation("teach", &writes);
-        writes.insert(30, FlashWrite::Erase { sector: 2 });
-        let turned = operation("sector change", &writes);
-        let tasks = tasks(&[teach, turned], 100, 1);
-        let of = |number| tasks.iter().filter(move |task| task.operation == number);
-        let words: Vec<usize> = of(0).map(|task| task.cut.at).collect();
-        assert_eq!(words, (0..50).collect::<Vec<_>>());
-        assert_eq!(of(1).count(), 100);
-        assert!(of(1).all(|task| task.cut.at < 51));
-        assert!(of(1).filter(|task| task.cut.at == 30).count() >= 5);
-        assert_eq!(of(1).filter(|task| task.probed).count(), PROBED);
+        assert_eq!(judge(&states, &uncalibrated), None);
+        let factory = Held {
+            factory: true,
+            ..held(1, 1)
+        };
+        assert_eq!(judge(&states, &factory), None);
     }
 }

@@ -1,16 +1,15 @@
 //! Why a run did not come to its end.
 
+use tactus_lab::sim::rig::SimError;
+
 use crate::board;
-use crate::host::args::WriteError;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
-use crate::host::under_finger::LearnError;
+use crate::host::under_finger::UnderFingerError;
 use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
-use super::cuts::held::CutError;
-use super::soak::day::DayError;
-use super::soak::hour_report::HourError;
+use super::cuts::CutError;
 
 /// Why a run did not come to its end.
 #[derive(Debug, thiserror::Error)]
@@ -18,7 +17,7 @@ pub(crate) enum RunError {
     #[error(transparent)]
     Board(#[from] board::Error),
     #[error(transparent)]
-    Learn(#[from] LearnError),
+    Learn(#[from] UnderFingerError),
     #[error(transparent)]
     Talk(#[from] TalkError),
     #[error(transparent)]
@@ -27,16 +26,12 @@ pub(crate) enum RunError {
     Missed(Vec<String>),
     #[error("cannot print the result: {0}")]
     Print(#[from] std::io::Error),
-    #[error(transparent)]
-    Write(#[from] WriteError),
     #[error("cannot listen on port {port}: {source}. Is it in use? 0 takes any free one")]
     Listen { port: u16, source: std::io::Error },
     #[error("power cuts: {0}")]
     Cut(#[from] CutError),
     #[error("the simulated rig of the PC: {0}")]
-    Day(#[from] DayError),
-    #[error("the emulated board: {0}")]
-    Hour(#[from] HourError),
+    Rig(#[from] SimError),
     #[error(transparent)]
     Bench(#[from] BenchError),
     #[error(transparent)]

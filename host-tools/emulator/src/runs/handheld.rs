@@ -46,7 +46,8 @@ pub(crate) struct Args {
     /// The probe has a sensor of motion
     #[arg(long)]
     motion: bool,
-    /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
+    /// The finger that the firmware is for: biotac, analog (piezo disc and load cell) or mems (accelerometer and load
+    /// cell)
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     finger: FingerName,
     /// How long the hand slides each time, s
@@ -55,6 +56,28 @@ pub(crate) struct Args {
     /// For people, or a line of JSON at the end for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+}
+
+impl Args {
+    fn scenario(&self, truth: &str) -> Scenario {
+        Scenario {
+            about: "an exploration".to_owned(),
+            texture: truth.to_owned(),
+            world: WORLD,
+            seed: self.seed,
+            hand: Manner {
+                // the hand holds it level
+                tilt_mm: self.motion.then_some(0.0),
+                ..Manner::default()
+            },
+            step: vec![Step::Explore {
+                force_n: FORCE_N,
+                pace_mm_s: PACE_MM_S,
+                slides: SLIDES,
+                seconds: self.slide_s,
+            }],
+        }
+    }
 }
 
 fn slide_s(text: &str) -> Result<f64, String> {
@@ -90,27 +113,11 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             args.seed
         );
     }
-    let scenario = Scenario {
-        about: "an exploration".to_owned(),
-        texture: truth.to_owned(),
-        world: WORLD,
-        seed: args.seed,
-        hand: Manner {
-            // the hand holds it level
-            tilt_mm: args.motion.then_some(0.0),
-            ..Manner::default()
-        },
-        step: vec![Step::Explore {
-            force_n: FORCE_N,
-            pace_mm_s: PACE_MM_S,
-            slides: SLIDES,
-            seconds: args.slide_s,
-        }],
-    };
     let mut session = Session::default();
     let mut status = Vec::new();
     // a request for the status is never too long
     let _ = session.request(Command::Status, &mut status);
+    let scenario = args.scenario(truth);
     let played = scenario::play_to(&scenario, args.finger, &args.firmware.elf, None, &status)?;
     let mut board = played.board;
     let times = milestones(&board, &played.seen);
@@ -119,32 +126,17 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     // negative where the verdict was there before the hand stood
     let stood_ns = board.rig().slides().last().map(|slide| slide.ended_ns);
     let written_ns = board.rig().display().written_ns();
-    let end_to_screen_s = match (stood_ns, written_ns) {
-        (Some(from), Some(to)) => Some((to as f64 - from as f64) * 1e-9),
-        _ => None,
-    };
-    let told = told(board.rig().display());
+    let end_to_screen_s = stood_ns
+        .zip(written_ns)
+        .map(|(from, to)| (to as f64 - from as f64) * 1e-9);
+    let told = told(board.rig().display()).ok_or(RunError::NoVerdict)?;
     let (says, verdict) = match told {
-        Some(Told::Sure(name)) => (format!("It is {name}."), name == truth),
-        Some(Told::Perhaps(name)) => (format!("{name}?"), false),
-        Some(Told::Unknown) => ("It is none of those known.".to_owned(), false),
-        None => return Err(RunError::NoVerdict),
+        Told::Sure(name) if name == truth => (format!("It is {name}."), "Right"),
+        Told::Sure(name) => (format!("It is {name}."), "Wrong"),
+        Told::Perhaps(name) => (format!("{name}?"), "Undecided"),
+        Told::Unknown => ("It is none of those known.".to_owned(), "Wrong"),
     };
-    let open = matches!(told, Some(Told::Perhaps(_)));
-    let verdict = match (verdict, open) {
-        (true, _) => "Right",
-        (_, true) => "Undecided",
-        _ => "Wrong",
-    };
-    let log = board.log()?;
-    // what the firmware said last
-    let last = |what: &str| {
-        let mut lines = log.iter().rev();
-        lines.find_map(|(_, line)| Some(line.split_once(what)?.1.trim().to_owned()))
-    };
-    let (awake, slots) = (last("awake listening:"), last("sensor slots:"));
     if !text {
-        let awake: Option<f64> = awake.and_then(|share| share.parse().ok());
         let line = json!({
             "finger": args.finger.as_str(),
             "truth": truth,
@@ -155,8 +147,6 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             "seconds_to_verdict": times.seconds_to_verdict(),
             "slides": board.rig().slides().len(),
             "slide_end_to_screen_s": end_to_screen_s,
-            "awake": awake,
-            "slots": slots,
             "force_max_n": board.rig().world().truth().force_max_n,
             "force_errors": heard.force_errors,
             "lost": heard.lost,
@@ -173,19 +163,12 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         "Right" => println!("Right."),
         _ => println!("{verdict}: it was {truth}."),
     }
-    println!(
-        "{}{seconds:.1} s of the board's time.",
-        times.sentence("touch")
-    );
+    let times = times.sentence("touch");
+    println!("{times}{seconds:.1} s of the board's time.");
     if let Some(seconds) = end_to_screen_s {
         let when = if seconds < 0.0 { "before" } else { "after" };
-        println!(
-            "The verdict was on the display {:.2} s {when} the hand stood.",
-            seconds.abs()
-        );
-    }
-    if let (Some(awake), Some(slots)) = (awake, slots) {
-        println!("Awake while it listens: {awake} of the time. Sensor slots: {slots}.");
+        let seconds = seconds.abs();
+        println!("The verdict was on the display {seconds:.2} s {when} the hand stood.");
     }
     Ok(())
 }

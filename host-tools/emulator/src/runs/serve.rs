@@ -21,8 +21,8 @@ pub(crate) struct Args {
     /// TCP port of this PC; 0 is any free one
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
-    /// Put the finger on a simulated arm, which a program moves through this TCP port of this PC; 0 is any free one. For the
-    /// firmware `tactus-arm`
+    /// Put the finger on a simulated arm, which a program moves through this TCP port of this PC; 0 is any free one.
+    /// For the firmware `tactus-arm`
     #[arg(long, value_name = "N")]
     arm_port: Option<u16>,
 }

@@ -42,6 +42,7 @@ fn code_that_is_broken_on_purpose_hangs_until_the_watchdog_resets_the_chip() {
 
 /// The words that a board without the debug probe's 8 MHz says, and whether it works all the same.
 #[test]
+#[ignore = "long"]
 fn a_board_without_the_probes_clock_runs_by_its_own() {
     let Some(elf) = elf() else { return };
     for clock in [true, false] {
@@ -86,9 +87,10 @@ fn a_start_up_that_hangs_is_ended_by_the_watchdog() {
     assert!(!resets.is_empty(), "it hangs for ever");
 }
 
-/// The first evening: nobody has calibrated anything, and up is down. The first act is to lift the finger; what presses it
-/// must not become the measure of no contact, neither by itself nor by a user who homes again.
+/// The first evening: nobody has calibrated anything, and up is down. The first act is to lift the finger; what presses
+/// it must not become the measure of no contact, neither by itself nor by a user who homes again.
 #[test]
+#[ignore = "long"]
 fn a_first_boot_that_goes_down_instead_of_up_presses_once_and_no_more() {
     let Some(elf) = elf() else { return };
     let setup = Setup {
@@ -114,6 +116,7 @@ fn a_first_boot_that_goes_down_instead_of_up_presses_once_and_no_more() {
 
 /// A flash that never says that it is ready keeps neither the finger down nor the rest of the rig from working.
 #[test]
+#[ignore = "long"]
 fn a_store_that_does_not_open_does_not_keep_the_finger_down() {
     let Some(elf) = elf() else { return };
     // a power cut while a page was erased: the store goes on with it when it is opened

@@ -9,8 +9,8 @@ use tactus_emulator::board::Options;
 use tactus_emulator::host::talk::Talk;
 use tactus_emulator::host::under_finger::Unknown;
 
-/// The ELF that an environment variable names, as `cargo xtask test` sets them: `TACTUS_ELF` is the rig's. Without it these
-/// tests have nothing to run, which `TACTUS_REQUIRE_ELF=1` makes a failure.
+/// The ELF that an environment variable names, as `cargo xtask test` sets them: `TACTUS_ELF` is the rig's. Without it
+/// these tests have nothing to run, which `TACTUS_REQUIRE_ELF=1` makes a failure.
 pub(crate) fn elf_of(variable: &str) -> Option<PathBuf> {
     let elf = std::env::var_os(variable).map(PathBuf::from);
     if elf.is_none() {

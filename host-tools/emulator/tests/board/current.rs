@@ -1,9 +1,10 @@
-//! The motor's current as the firmware reads it, against that of the simulated motor, which swings with every period of its PWM.
+//! The motor's current as the firmware reads it, against that of the simulated motor, which swings with every period of
+//! its PWM.
 
 use std::path::Path;
 
 use tactus_core::wire::Event;
-use tactus_emulator::board::{Emulator, Options, Switch};
+use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::talk::Talk;
 use tactus_link::Request;
 use tactus_world::world::Setup;
@@ -46,8 +47,8 @@ fn over(elf: &Path, texture: u8) -> Talk {
     talk
 }
 
-/// The largest error of the current without load among the speeds, A: of what the firmware calibrates itself with, less the
-/// error that all speeds have in common, which the amplifier's zero makes.
+/// The largest error of the current without load among the speeds, A: of what the firmware calibrates itself with, less
+/// the error that all speeds have in common, which the amplifier's zero makes.
 fn unloaded_error_a(talk: &mut Talk) -> f64 {
     let mut truths = [Mean::default(); SPEEDS.len()];
     let read = talk.run(Request::calibrate(), 80.0, |board, _| {
@@ -112,6 +113,7 @@ fn traction_errors_a(talk: &mut Talk, slides: u8) -> Vec<f64> {
 }
 
 #[test]
+#[ignore = "long"]
 fn the_current_is_the_mean_over_the_periods_of_the_motors_pwm() {
     let Some(elf) = elf() else { return };
     let mut talk = over(&elf, 30);
@@ -126,26 +128,4 @@ fn the_current_is_the_mean_over_the_periods_of_the_motors_pwm() {
         "the current is wrong by {:.1} mA: {unloaded_a:.4} A without load, {tractions_a:.4?} A in slides",
         1e3 * worst_a
     );
-}
-
-/// A converter that is dead from the start keeps neither the boot waiting nor the reason from being said.
-#[test]
-fn a_converter_that_is_dead_from_the_start_is_told() {
-    let Some(elf) = elf() else { return };
-    let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
-    board.upset(Switch::Adc1, true).unwrap();
-    let mut talk = Talk::new(board);
-    let mut words = Vec::new();
-    while talk.now_ns() < 6_000_000_000 {
-        for report in talk.step().unwrap() {
-            if let Event::Booted { last_words, .. } = report.event {
-                words.push(last_words.map(|words| words.as_str().to_owned()));
-            }
-        }
-    }
-    let told = words
-        .iter()
-        .flatten()
-        .any(|words| words.contains("current"));
-    assert!(told, "no word of it: {words:?}");
 }

@@ -1,4 +1,5 @@
-//! The rig's image with other fingers than a BioTac: it finds out which one is there, starts its parts, identifies with them, and names what is wrong with them.
+//! The rig's image with other fingers than a BioTac: it finds out which one is there, starts its parts, identifies with
+//! them, and names what is wrong with them.
 
 use tactus_core::explorer::Method;
 use tactus_core::rig::Fault;
@@ -92,7 +93,8 @@ fn told(talk: &mut Talk, until_s: f64) -> (Vec<Fault>, Vec<String>) {
     (faults, sentences)
 }
 
-/// Plugs everything in, and has the rig home once the probe has noticed: it starts again for another finger than a BioTac.
+/// Plugs everything in, and has the rig home once the probe has noticed: it starts again for another finger than a
+/// BioTac.
 fn works_again(talk: &mut Talk) {
     talk.board().rig().world().clear();
     let now_s = talk.now_ns() as f64 * 1e-9;
@@ -104,6 +106,7 @@ fn works_again(talk: &mut Talk) {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_finger_that_is_plugged_in_late_is_found() {
     for finger in FingerName::ALL {
         let Some(mut board) = board(finger) else {
@@ -127,6 +130,7 @@ fn a_finger_that_is_plugged_in_late_is_found() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_part_that_is_not_there_is_named_until_it_is() {
     let Some(board) = board(FingerName::Mems) else {
         return;
@@ -167,6 +171,7 @@ fn a_part_that_is_read_in_a_wrong_mode_is_silent() {
 
 /// A brown-out leaves the parts their identity and stops their data.
 #[test]
+#[ignore = "long"]
 fn a_brown_out_while_it_slides_is_named() {
     for fault in [PartFault::AccelerometerBrownOut, PartFault::CellBrownOut] {
         let Some(board) = board(FingerName::Mems) else {

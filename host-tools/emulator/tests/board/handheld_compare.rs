@@ -1,5 +1,5 @@
-//! "Is it the same as that one?", asked of the real ELF of the handheld by its button alone: judged by what lies under the
-//! finger, from the display and the go / no-go output.
+//! "Is it the same as that one?", asked of the real ELF of the handheld by its button alone: judged by what lies under
+//! the finger, from the display and the go / no-go output.
 
 use tactus_core::table::Table;
 use tactus_lab::sim::scenario::texture;
@@ -11,6 +11,7 @@ use crate::handheld_link::{Held, shows};
 const REFERENCE: u16 = 2;
 
 #[test]
+#[ignore = "long"]
 fn a_texture_is_compared_with_one_that_is_chosen_by_the_button() {
     let Some(mut held) = Held::new("burlap", Manner::default()) else {
         return;

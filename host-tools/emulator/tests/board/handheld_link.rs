@@ -1,24 +1,15 @@
-//! The real ELF of the handheld probe and a host at its serial link, while a person holds it: judged by what comes over the
-//! wire and by what the display shows.
+//! The real ELF of the handheld probe and a host at its serial link, while a person holds it: judged by what comes over
+//! the wire and by what the display shows.
 
 use std::path::Path;
 
-use tactus_core::dsp::Plan;
-use tactus_core::explorer::{Method, Strategy};
-use tactus_core::features::{FeatureSet, Measurement, Observation, Slide};
-use tactus_core::rig::calibration::{LineFit, RigCalibration};
+use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{Name, Table};
-use tactus_core::wire::{
-    Command, Event, Forget, Identify, Phase, Prompt, Report, SlideReport, Status, Train,
-};
+use tactus_core::wire::{Command, Event, Forget, Identify, Phase, Prompt, Report, Status};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::person::Person;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
-use tactus_lab::data::recorder::Recorder;
-use tactus_lab::data::recording::{Recording, Texture};
-use tactus_lab::data::recordings::{RecordingSet, RecordingWriter};
-use tactus_lab::eval::learn::learn;
 use tactus_lab::sim::collection::Collection;
 use tactus_lab::sim::handheld::ground;
 use tactus_link::{PushTable, ReadTable, Request};
@@ -27,7 +18,7 @@ use tactus_world::parts::PartFault;
 use tactus_world::person::Manner;
 use tactus_world::world::Setup;
 
-use crate::common::{elf_of, with_limits_of_change};
+use crate::common::elf_of;
 
 /// Longest exploration or training by hand, virtual seconds.
 const LONG_S: f64 = 120.0;
@@ -251,112 +242,9 @@ fn it_says_how_it_is_and_gives_and_takes_tables() {
     held.end();
 }
 
-#[test]
-fn its_calibration_is_read_and_written_and_survives() {
-    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
-        return;
-    };
-    let mut held = Held::with(&elf, "burlap", Manner::default(), None);
-    let mut calibration = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
-    calibration.pressure.force_mn_per_count = 12.5;
-    calibration.date = 20_261_123;
-    held.run(Request::write_calibration(&calibration).unwrap(), TIMEOUT_S)
-        .unwrap();
-    let store = held.talk.board().store().unwrap();
-    drop(held);
-    let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
-    let kept: RigCalibration = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
-    assert_eq!(kept, calibration);
-    assert_eq!(held.status().calibrated, 20_261_123);
-    held.end();
-}
-
-#[test]
-fn it_identifies_what_a_person_slides_over_for_the_host() {
-    let Some(mut held) = Held::new("burlap", Manner::default()) else {
-        return;
-    };
-    let found = held
-        .run(Request::identify(Identify::default()), LONG_S)
-        .unwrap();
-    assert_eq!(found.verdict.name, "Burlap", "{found:?}");
-    assert!(found.verdict.sure);
-    assert_eq!(held.prompts[..2], [Prompt::Press, Prompt::Slide]);
-    // the person sees it, too
-    held.until("the verdict", 1.0, |board| shows(board, "Burlap"));
-    held.until("its end", 1.0, |board| shows(board, "next"));
-    held.end();
-}
-
-#[test]
-fn it_learns_a_texture_by_train_and_by_a_label() {
-    let Some(mut held) = Held::new("corkboard", Manner::default()) else {
-        return;
-    };
-    // the table has the very same
-    let known = Request::forget(Forget::Texture(name("Corkboard")));
-    held.run(known, TIMEOUT_S).unwrap();
-    let train = Train {
-        name: name("my cork"),
-        trials: 3,
-        pilot: false,
-        seed: 1,
-    };
-    let slides = held.run(Request::train(train), LONG_S).unwrap();
-    assert_eq!(slides, 3);
-    held.until("what was learned", 1.0, |board| shows(board, "my cork"));
-    let table = held.table();
-    let table = Table::read(&table).unwrap();
-    let texture = table.find("my cork").unwrap();
-    assert_eq!(table.trials(texture, 0), 3);
-    let found = held
-        .run(Request::identify(Identify::default()), LONG_S)
-        .unwrap();
-    assert_eq!(found.verdict.name, "my cork");
-    let learned = held
-        .run(Request::label(name("second cork")), TIMEOUT_S)
-        .unwrap();
-    assert_eq!(learned.name, "second cork");
-    held.end();
-}
-
-#[test]
-fn a_request_ends_when_the_host_stops_it_and_when_the_person_will_not() {
-    let Some(mut held) = Held::new("burlap", Manner::default()) else {
-        return;
-    };
-    // nobody touches: the person is not let look
-    let identify = Request::identify(Identify::default());
-    let Held { talk, .. } = &mut held;
-    let stop_ns = talk.now_ns() + 3_000_000_000;
-    let mut asked = 0;
-    let mut sent = false;
-    let stopped = talk.run(identify, LONG_S, |board, report| {
-        if let Some(Report {
-            event: Event::Prompt(Prompt::Press),
-            ..
-        }) = report
-        {
-            asked += 1;
-        }
-        if !sent && board.now_ns() > stop_ns {
-            sent = true;
-            board.press(true).unwrap();
-        }
-    });
-    held.talk.board().press(false).unwrap();
-    assert!(
-        matches!(&stopped, Err(TalkError::Refused(why)) if why.contains("stopped")),
-        "{stopped:?}"
-    );
-    // it was asked about every second, so that the host knows that the probe is there
-    assert!((3..=6).contains(&asked), "{asked}");
-    held.until("ready again", 1.0, |board| shows(board, "and hold"));
-    held.end();
-}
-
 /// The cable is pulled out in the middle of a slide: nobody hears or says anything any more.
 #[test]
+#[ignore = "long"]
 fn a_link_that_is_cut_leaves_a_probe_that_works() {
     let Some(mut held) = Held::new("burlap", Manner::default()) else {
         return;
@@ -404,131 +292,6 @@ fn a_link_that_is_cut_leaves_a_probe_that_works() {
     held.end();
 }
 
-/// The book's chapter "Learn with a handheld": recorded by hand, learned on the PC, pushed, and known from then on.
-#[test]
-fn slides_that_are_recorded_by_hand_are_learned_pushed_and_known() {
-    const SLIDES: u8 = 4;
-    let names = ["Burlap", "Cork", "Marble"];
-    let numbers =
-        ["burlap", "corkboard", "marble"].map(|n| tactus_lab::sim::scenario::texture(n).unwrap());
-    let Some(mut held) = Held::new("burlap", Manner::default()) else {
-        return;
-    };
-    let folder = std::env::temp_dir().join(format!("tactus-by-hand-{}", std::process::id()));
-    let textures = names.iter().zip(1..).map(|(name, id)| Texture {
-        id,
-        name: (*name).to_owned(),
-    });
-    let mut writer = RecordingWriter::begin(&folder, textures.collect(), "a test").unwrap();
-    let calibration = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
-    held.run(Request::command(Command::Stream(true)), TIMEOUT_S)
-        .unwrap();
-    for (index, number) in numbers.into_iter().enumerate() {
-        held.talk.board().rig().world().place(number).unwrap();
-        let wanted = Identify {
-            threshold: 1.0,
-            max_slides: SLIDES,
-            strategy: Strategy::Cycling,
-            open: false,
-            ..Identify::default()
-        };
-        held.run(Request::identify(wanted), LONG_S).unwrap();
-        let mut recorder = Recorder::new(calibration.pressure);
-        let heard = held.reports.iter();
-        let slides = heard.filter_map(|report| recorder.hear(index, report));
-        let slides: Vec<_> = slides.collect::<Result<_, _>>().unwrap();
-        assert_eq!(slides.len(), usize::from(SLIDES));
-        // what is recorded is what was measured, to the bit
-        let reported = held
-            .reports
-            .iter()
-            .filter_map(|report| match &report.event {
-                Event::SlideReport { observed, .. } => Some(observed.clone()),
-                _ => None,
-            });
-        for (slide, reported) in slides.iter().zip(reported) {
-            assert_eq!(SlideReport::from(&measured(slide)), reported);
-            writer.write(slide).unwrap();
-        }
-    }
-    held.run(Request::command(Command::Stream(false)), TIMEOUT_S)
-        .unwrap();
-    writer.finish().unwrap();
-    let set = RecordingSet::open(&folder).unwrap();
-    let known: Vec<Vec<Vec<Observation>>> = (0..names.len())
-        .map(|index| {
-            let slides = set.load_texture(index).unwrap();
-            vec![slides.iter().map(|s| (&measured(s)).into()).collect()]
-        })
-        .collect();
-    std::fs::remove_dir_all(&folder).unwrap();
-    let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
-    let features = Some(FeatureSet::Pressure);
-    let table = learn(Method::Fused, features, &names, &set.movements(), &known).unwrap();
-    held.push(&table);
-    held.until("its textures", 1.0, |board| shows(board, "3 textures"));
-    for (name, number) in names.iter().zip(numbers) {
-        held.talk.board().rig().world().place(number).unwrap();
-        let found = held
-            .run(Request::identify(Identify::default()), LONG_S)
-            .unwrap();
-        assert_eq!(found.verdict.name.as_str(), name, "{found:?}");
-    }
-    held.end();
-}
-
-fn measured(slide: &Recording) -> Measurement {
-    let plan = Plan::new();
-    let mut samples = Slide::new(&plan, slide.movement);
-    slide.play(&mut samples);
-    samples.finish().unwrap()
-}
-
-/// A finger that gives way more than the paper's would be pressed too hard; weights say what its counts mean.
-#[test]
-fn known_weights_set_the_force_that_the_person_is_shown() {
-    let steady = Manner {
-        tremor: 0.0,
-        wander: 0.0,
-        uneven: 0.0,
-        force_spread: 0.0,
-        pace_spread: 0.0,
-        tilt_mm: None,
-    };
-    let Some(mut held) = Held::new("burlap", steady) else {
-        return;
-    };
-    let mut calibration = held.run(Request::calibrate(), TIMEOUT_S).unwrap();
-    assert_eq!(held.prompts, [Prompt::Lift]);
-    let mut line = LineFit::default();
-    line.push(0.0, 0.0);
-    for mn in [490, 980, 1470] {
-        let counts = held.run(Request::weigh(mn), TIMEOUT_S).unwrap();
-        assert!(
-            held.prompts.contains(&Prompt::Weigh(mn)),
-            "{:?}",
-            held.prompts
-        );
-        eprintln!("{mn} mN: {counts} counts");
-        line.push(counts, mn.into());
-    }
-    let (_, mn_per_count) = line.line().unwrap();
-    // the simulated finger's, as the world has it
-    let truth = held.talk.board().rig().world().truth();
-    eprintln!("{mn_per_count} mN a count, {truth:?}");
-    calibration.pressure.force_mn_per_count = mn_per_count;
-    calibration.date = 20_261_123;
-    held.run(Request::write_calibration(&calibration).unwrap(), TIMEOUT_S)
-        .unwrap();
-    // it is shown
-    held.until("ready", 2.0, |board| shows(board, "and hold"));
-    held.take("about this probe", 1);
-    held.until("its day", 1.0, |board| shows(board, "2026-11-23"));
-    held.rest();
-    half_a_newton_is_half_a_newton(&mut held);
-    held.end();
-}
-
 /// The force that the handheld tells is the one that the hand presses with.
 fn half_a_newton_is_half_a_newton(held: &mut Held) {
     let found = held
@@ -543,57 +306,9 @@ fn half_a_newton_is_half_a_newton(held: &mut Held) {
     assert!((450..600).contains(&most), "{most}");
 }
 
-/// With a table by which every texture has changed, the button alone says whether it is that one.
-#[test]
-fn a_changed_texture_is_confirmed_or_denied_by_the_button() {
-    let Some(mut held) = Held::new("burlap", Manner::default()) else {
-        return;
-    };
-    let table = with_limits_of_change(&held.table(), -9000.0);
-    held.push(&table);
-    let before = held.table();
-    assert_eq!(before, table);
-    let old = Table::read(&before).unwrap();
-    let burlap = old.find("Burlap").unwrap();
-    // yes: it moves, and nothing else does
-    held.slide_until("Is it the same one?");
-    assert!(shows(held.talk.board(), "Burlap?"));
-    held.press_for(700);
-    held.until("what was learned", 3.0, |board| shows(board, "Learned"));
-    held.until("ready", 5.0, |board| shows(board, "and hold"));
-    let moved = held.table();
-    let new = Table::read(&moved).unwrap();
-    assert_eq!(new.textures(), old.textures());
-    for texture in 0..old.textures() {
-        let same = new.whitened(texture, 0) == old.whitened(texture, 0);
-        assert_eq!(same, texture != burlap, "{texture}");
-    }
-    assert!(new.tally(burlap).user > old.tally(burlap).user);
-    assert_eq!(new.limits(), old.limits());
-    // no: a new one, and the old one stays
-    held.slide_until("Is it the same one?");
-    held.press_for(100);
-    held.until("the list", 2.0, |board| shows(board, "What is it?"));
-    held.until("a new one", 2.0, |board| shows(board, "new: sample 1"));
-    held.press_for(700);
-    held.until("its name", 3.0, |board| shows(board, "sample 1"));
-    held.until("ready", 5.0, |board| shows(board, "and hold"));
-    let added = held.table();
-    let added = Table::read(&added).unwrap();
-    assert_eq!(added.textures(), new.textures() + 1);
-    assert!(added.find("sample 1").is_some());
-    assert_eq!(added.whitened(burlap, 0), new.whitened(burlap, 0));
-    // the log is written with interrupts off while nobody touches anything: a slot may be late then, and none is lost
-    let counts = held.status().counts;
-    assert!(
-        counts.late_slots <= 2 && counts.lost_samples == 0,
-        "{counts:?}"
-    );
-    assert_eq!(counts.lost_reports, 0);
-}
-
 /// Nobody is at the other end of the cable: the display asks, a person lays weights on the finger.
 #[test]
+#[ignore = "long"]
 fn the_force_is_set_on_its_own_screen() {
     let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
         return;
@@ -622,6 +337,7 @@ fn the_force_is_set_on_its_own_screen() {
 
 /// A finger with an accelerometer is turned over: no computer, and then one.
 #[test]
+#[ignore = "long"]
 fn a_finger_is_turned_over_on_its_own_screen_and_for_a_host() {
     let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
         return;

@@ -4,15 +4,12 @@
 mod arm;
 mod boot;
 mod bringup;
+mod broken_code;
 mod changed_cuts;
-mod commands;
 mod common;
 mod current;
-mod cycles;
 mod damaged_store;
-mod early;
 mod explore;
-mod fault_cases;
 mod faults;
 mod fingers;
 mod halt;

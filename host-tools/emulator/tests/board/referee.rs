@@ -1,4 +1,5 @@
-//! Small firmwares with one mistake each: the referee has to name it, and has nothing against the same without the mistake.
+//! Small firmwares with one mistake each: the referee has to name it, and has nothing against the same without the
+//! mistake.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What silicon does that a model forgives: a core that waits for its flash, peripherals that a disturbance has switched off,
+//! What silicon does that a model forgives: peripherals that a disturbance has switched off,
 //! an erase that never ends, a stack that grows into the variables, a task that does not start.
 
 use std::path::Path;
@@ -10,17 +10,12 @@ use tactus_emulator::board::{Emulator, Options, Output, Switch};
 use tactus_emulator::host::talk::{Talk, TalkError};
 use tactus_world::world::Setup;
 
+use crate::broken_code::NOWHERE;
 use crate::common::{elf, elf_of, ready};
 use crate::faults::{When, board, board_with, identify, is_time};
 
-const FLASH_ACR: u64 = 0x4002_3C00;
 const RCC_CR: u64 = 0x4002_3800;
 const HSEON: u32 = 1 << 16;
-/// Prefetch and instruction cache; the data cache must be off while the store is written.
-const ACCELERATOR: u32 = 0b011 << 8;
-const CACHES: u32 = 0b111 << 8;
-/// Unused flash.
-const NOWHERE: u64 = 0x080F_FF00;
 
 fn images() -> impl Iterator<Item = std::path::PathBuf> {
     ["TACTUS_ELF", "TACTUS_HANDHELD_ELF"]
@@ -28,25 +23,9 @@ fn images() -> impl Iterator<Item = std::path::PathBuf> {
         .filter_map(elf_of)
 }
 
-#[test]
-fn prefetch_and_cache_make_up_for_the_flashs_wait_states() {
-    for elf in images() {
-        let options = Options {
-            mpu: true,
-            ..Options::default()
-        };
-        let mut board = Emulator::start(&elf, Setup::default(), options).unwrap();
-        board.run_ms(800).unwrap();
-        assert_eq!(board.resets().unwrap(), []);
-        let acr = board.register(FLASH_ACR).unwrap();
-        assert_eq!(acr & 0xF, 5, "wait states at 168 MHz");
-        let on = acr & CACHES;
-        assert_eq!(on, ACCELERATOR, "the core waits for its flash");
-    }
-}
-
 /// A driver of a stepper that has just got current wants a while before its first step.
 #[test]
+#[ignore = "long"]
 fn the_lever_waits_between_current_and_its_first_step() {
     let Some(elf) = elf() else { return };
     let options = Options {
@@ -154,6 +133,7 @@ fn upset(elf: &Path, switch: Switch, lasting: bool) -> Outcome {
 
 /// A frame that does not come is a lost word.
 #[test]
+#[ignore = "long"]
 fn a_bus_that_goes_off_costs_a_word_and_not_the_watchdogs_patience() {
     let Some(elf) = elf() else { return };
     let once = upset(&elf, Switch::Spi1, false);
@@ -167,8 +147,10 @@ fn a_bus_that_goes_off_costs_a_word_and_not_the_watchdogs_patience() {
     lasting.assert_lifted();
 }
 
-/// A converter that stops, or its DMA, is started anew and costs samples; where that does not help the motor is not driven on.
+/// A converter that stops, or its DMA, is started anew and costs samples; where that does not help the motor is not
+/// driven on.
 #[test]
+#[ignore = "long"]
 fn a_converter_that_goes_off_costs_a_sample_and_not_the_watchdogs_patience() {
     let Some(elf) = elf() else { return };
     for switch in [Switch::Adc1, Switch::Dma2] {
@@ -190,9 +172,10 @@ fn a_converter_that_goes_off_costs_a_sample_and_not_the_watchdogs_patience() {
     }
 }
 
-/// The store is opened while the finger is lifted and homed, and waits for an erase that is never over. A write to the flash's
-/// control register would have the core wait, too.
+/// The store is opened while the finger is lifted and homed, and waits for an erase that is never over. A write to the
+/// flash's control register would have the core wait, too.
 #[test]
+#[ignore = "long"]
 fn an_erase_that_never_ends_is_left_to_itself() {
     // a power cut while a page was erased: the store goes on with it when it is opened
     let mut store = vec![0xFF; 64 << 10];
@@ -220,47 +203,55 @@ fn an_erase_that_never_ends_is_left_to_itself() {
 /// The stack's end is guarded: what grows beyond it is stopped before it writes to variables.
 #[test]
 fn a_stack_that_overflows_is_stopped_at_its_guard() {
+    overflows(When::Pressing);
+}
+
+#[test]
+#[ignore = "long"]
+fn a_stack_that_overflows_while_it_slides_is_stopped_at_its_guard() {
+    overflows(When::Sliding);
+}
+
+fn overflows(when: When) {
     let Some(elf) = elf() else { return };
-    for when in [When::Pressing, When::Sliding] {
-        let options = Options {
-            mpu: true,
-            ..Options::default()
-        };
-        let mut talk = board_with(&elf, 82, 30, options);
-        let mut words = None;
-        let mut planted = false;
-        let ended = talk.send(identify(1), 120.0, |board, report| {
-            if let Some(Event::Booted { last_words, .. }) = report.map(|report| &report.event) {
-                words = last_words.as_ref().map(|words| words.as_str().to_owned());
+    let options = Options {
+        mpu: true,
+        ..Options::default()
+    };
+    let mut talk = board_with(&elf, 82, 30, options);
+    let mut words = None;
+    let mut planted = false;
+    let ended = talk.send(identify(1), 120.0, |board, report| {
+        if let Some(Event::Booted { last_words, .. }) = report.map(|report| &report.event) {
+            words = last_words.as_ref().map(|words| words.as_str().to_owned());
+        }
+        if !planted && is_time(when, board) {
+            planted = true;
+            // push {r0-r7}, and again
+            board.write(NOWHERE, &[0xFF, 0xB4, 0xFD, 0xE7]).unwrap();
+            let (task, _) = board.symbol("tactus_check_in").unwrap();
+            let task = task & !1;
+            // ldr.w pc, [pc], and the address behind; nop first, where it would not be a multiple of 4
+            let mut code = vec![0xDF, 0xF8, 0x00, 0xF0];
+            if !task.is_multiple_of(4) {
+                code.splice(0..0, [0x00, 0xBF]);
             }
-            if !planted && is_time(when, board) {
-                planted = true;
-                // push {r0-r7}, and again
-                board.write(NOWHERE, &[0xFF, 0xB4, 0xFD, 0xE7]).unwrap();
-                let (task, _) = board.symbol("tactus_check_in").unwrap();
-                let task = task & !1;
-                // ldr.w pc, [pc], and the address behind; nop first, where it would not be a multiple of 4
-                let mut code = vec![0xDF, 0xF8, 0x00, 0xF0];
-                if !task.is_multiple_of(4) {
-                    code.splice(0..0, [0x00, 0xBF]);
-                }
-                code.extend((NOWHERE as u32 | 1).to_le_bytes());
-                let whole = board.read(task, code.len() as u64).unwrap();
-                board.write(task, &code).unwrap();
-                board.run_ms(10).unwrap();
-                board.write(task, &whole).unwrap();
-            }
-        });
-        eprintln!("{when:?}: {ended:?}: {words:?}");
-        assert!(planted);
-        assert!(
-            words.is_some_and(|words| words.contains("stack")),
-            "no word of it"
-        );
-        ready(&mut talk);
-        let force_max_n = talk.board().rig().world().truth().force_max_n;
-        assert!(force_max_n < 2.2, "{force_max_n} N");
-    }
+            code.extend((NOWHERE as u32 | 1).to_le_bytes());
+            let whole = board.read(task, code.len() as u64).unwrap();
+            board.write(task, &code).unwrap();
+            board.run_ms(10).unwrap();
+            board.write(task, &whole).unwrap();
+        }
+    });
+    eprintln!("{when:?}: {ended:?}: {words:?}");
+    assert!(planted);
+    assert!(
+        words.is_some_and(|words| words.contains("stack")),
+        "no word of it"
+    );
+    ready(&mut talk);
+    let force_max_n = talk.board().rig().world().truth().force_max_n;
+    assert!(force_max_n < 2.2, "{force_max_n} N");
 }
 
 /// Where a task's memory says that it runs, from its beginning on: found on a board where it does.
@@ -278,6 +269,7 @@ fn runs_at(elf: &Path, task: &str) -> u64 {
 
 /// A task that cannot be started stops the boot, and says so by the red LED: the motors stay off.
 #[test]
+#[ignore = "long"]
 fn a_task_that_does_not_start_stops_the_boot() {
     for (variable, task) in [
         ("TACTUS_ELF", "::servo::servo::POOL"),

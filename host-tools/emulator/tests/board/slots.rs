@@ -11,7 +11,8 @@ use tactus_world::world::Setup;
 use crate::common::{elf, elf_of, ready};
 use crate::faults::identify;
 
-/// A transaction as the firmware keeps it in RAM: its time, the gap behind it, three frames, the select, how many bytes.
+/// A transaction as the firmware keeps it in RAM: its time, the gap behind it, three frames, the select, how many
+/// bytes.
 const GAP_AT: u64 = 4;
 const FRAME_AT: u64 = 8;
 const SELECT_AT: u64 = 14;
@@ -43,7 +44,7 @@ fn the_sensor_has_nothing_to_complain_of() {
     let board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
     let mut talk = Talk::new(board);
     ready(&mut talk);
-    talk.send(identify(2), 120.0, |_, _| ()).unwrap();
+    talk.send(identify(1), 120.0, |_, _| ()).unwrap();
     let (complaints, commands) = heard(talk.board());
     assert_eq!(complaints, []);
     let seconds = talk.board().now_ns() as f64 * 1e-9 - 0.1;
@@ -51,7 +52,7 @@ fn the_sensor_has_nothing_to_complain_of() {
     assert!((commands as f64 - due).abs() < 30.0, "{commands} of {due}");
     let rig = talk.board().rig();
     let slides = rig.slides();
-    assert_eq!(slides.len(), 2);
+    assert_eq!(slides.len(), 1);
     for slide in slides {
         eprintln!("{slide:?}");
         assert_eq!(slide.missed_slots, 0);
@@ -151,8 +152,10 @@ fn a_slot_that_reads_before_it_asks_has_no_sample() {
     assert_eq!(seen, Some(Seen::SensorSilent));
 }
 
-/// One command of thousands is A1, as noise on a select that floats may make it: the sensor streams, until it hears no clock for 5 s.
+/// One command of thousands is A1, as noise on a select that floats may make it: the sensor streams, until it hears no
+/// clock for 5 s.
 #[test]
+#[ignore = "long"]
 fn a_sensor_that_streams_is_left_alone_until_it_answers() {
     /// The frame that asks for P_AC, and the one that starts the streaming mode.
     const ASKS: u16 = 0x8000;

@@ -17,10 +17,8 @@ const LIVE_HZ: u32 = 20;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// A report was lost on the line.
     #[error("block {0} of its samples is missing")]
     MissingBlock(u16),
-    /// No samples came.
     #[error("its samples did not come")]
     NoSamples,
 }
@@ -34,7 +32,6 @@ pub struct Recorder {
     slide: Begun,
 }
 
-/// The data of a slide so far.
 #[derive(Debug, Default)]
 struct Begun {
     blocks: Vec<Block>,
@@ -75,9 +72,6 @@ impl Recorder {
 
     /// Takes in a report; the slide that counts from now on, for the texture of this index. One that ended early is no
     /// recording of its movement.
-    ///
-    /// # Errors
-    /// See [`RecordError`].
     pub fn hear(
         &mut self,
         texture: usize,

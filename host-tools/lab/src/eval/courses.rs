@@ -8,14 +8,13 @@ use crate::eval::experiment::Experiment;
 
 /// The belief of an explorer after a slide.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Belief {
+pub(crate) struct Belief {
     /// The most probable texture.
     pub texture: usize,
     /// Its posterior probability.
     pub probability: f32,
     /// True if it is rather none of the known textures: then no threshold makes the texture sure.
     rather_new: bool,
-    /// True if the verdict would be a new texture.
     is_new: bool,
     /// True if it differs from the texture as it was learned.
     is_changed: bool,
@@ -26,8 +25,7 @@ pub struct Belief {
 pub struct Course {
     /// The texture that was to be identified.
     pub presented: usize,
-    /// After each slide.
-    pub beliefs: Vec<Belief>,
+    pub(crate) beliefs: Vec<Belief>,
 }
 
 impl Course {
@@ -56,9 +54,6 @@ impl Course {
 }
 
 /// Plays runs as [`evaluate`](super::evaluate::evaluate) does, but without a threshold: see [`Course::told`].
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn courses(
     experiment: &Experiment,
     config: Config,

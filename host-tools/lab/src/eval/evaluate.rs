@@ -134,7 +134,6 @@ impl<'b> Shared<'b> {
         }
     }
 
-    /// Of the table in these bytes.
     fn with(bytes: &'b [u8], of: &Experiment, config: Config) -> Result<Self, EvaluateError> {
         let explorer = explorer(bytes, of.measured(), config, of.candidates())?;
         Ok(Self::new(explorer, config.strategy))
@@ -203,9 +202,6 @@ pub fn play_with<const N: usize>(
 
 /// Plays `runs` runs on all cores; `done` is called after each. The outcomes are in the order of the runs, and the same
 /// for any number of threads.
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn evaluate(
     experiment: &Experiment,
     config: Config,
@@ -262,9 +258,7 @@ pub(super) fn evaluate_by<T: Send>(
 pub(super) type Kept<'k> = Option<&'k Confusions<Vec<Degrees>>>;
 
 /// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
-///
-/// # Errors
-/// The table does not read, or cannot be explored.
+/// Errors: the table does not read, or cannot be explored.
 #[inline(never)]
 pub fn explorer<'b>(
     bytes: &'b [u8],

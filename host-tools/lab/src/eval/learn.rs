@@ -59,7 +59,7 @@ pub fn measured(slides: &Slides) -> PropertySet {
 }
 
 /// The best features that every slide has: force, else P_DC, else bands alone, else the three properties.
-pub fn best_features(slides: &Slides) -> FeatureSet {
+pub(crate) fn best_features(slides: &Slides) -> FeatureSet {
     let has = |set: FeatureSet| {
         let mut all = slides.iter().flatten().flatten();
         all.all(|slide| length(set, slide) > 0 && slide.vector(set, length(set, slide)).is_some())
@@ -80,9 +80,6 @@ fn length(set: FeatureSet, slide: &Observation) -> usize {
 }
 
 /// Learns a table for a method; the fused one from `features`, or the best there are, for the usual drift.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn(
     method: Method,
     features: Option<FeatureSet>,
@@ -113,9 +110,7 @@ impl Default for Expected {
 }
 
 /// A table with the finger that its slides were made with, and the day of that finger's calibration.
-///
-/// # Errors
-/// These bytes are no table.
+/// Errors: these bytes are no table.
 pub fn name_finger(
     bytes: &[u8],
     finger: FingerCode,
@@ -136,9 +131,7 @@ pub fn name_finger(
 /// A table with the statistics of shorter slides, the shortest first: their length in ms, a table learned from the
 /// first parts of the same slides, and a bit for each movement whose slides are longer. Without any, the table without
 /// those statistics.
-///
-/// # Errors
-/// A table is invalid, or not of the same textures and movements.
+/// Errors: A table is invalid, or not of the same textures and movements.
 pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let shorter = shorter.iter().map(|(ms, table, movements)| {
@@ -169,9 +162,6 @@ pub struct ObservedTrial {
 
 /// As [`learn_for`], with features after each of these lengths, in ms at constant speed, the shortest first: those that
 /// each trial was observed at.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn_lengths(
     expected: &Expected,
     method: Method,
@@ -205,9 +195,6 @@ pub fn learn_lengths(
 }
 
 /// As [`learn`], with these expectations.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn_for(
     expected: &Expected,
     method: Method,
@@ -244,9 +231,6 @@ pub fn experience(measured: PropertySet, slides: &[Observation]) -> Experience {
 }
 
 /// Writes a table of Gaussians of any size.
-///
-/// # Errors
-/// See [`EncodeError`].
 pub fn encode(
     measured: PropertySet,
     movements: &[Movement],

@@ -94,9 +94,6 @@ pub struct Novelty {
 }
 
 /// Leaves one texture after the other out of the table, and presents it; and one that was not left out beside it.
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn leave_one_out(
     experiment: &Experiment,
     config: Config,
@@ -106,7 +103,6 @@ pub fn leave_one_out(
     leave_out(experiment, config, 1, runs, done)
 }
 
-/// Groups of textures that are left out of a table together.
 struct Groups(Vec<Vec<usize>>);
 
 impl Groups {
@@ -130,7 +126,6 @@ impl Groups {
         Self((0..textures).step_by(together).map(group).collect())
     }
 
-    /// The first group that a texture is in.
     fn of(&self, texture: usize) -> &[usize] {
         let group = self.0.iter().find(|group| group.contains(&texture));
         group.map_or(&[], Vec::as_slice)
@@ -138,9 +133,6 @@ impl Groups {
 }
 
 /// As [`leave_one_out`], with so many textures left out of each table together.
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn leave_out(
     experiment: &Experiment,
     config: Config,

@@ -19,7 +19,6 @@ use crate::eval::verdicts::Verdicts;
 pub const RUNS: u64 = 25;
 /// Share of confused slides below which a pair is not listed.
 const WORTH_SAYING: f64 = 0.01;
-/// Most pairs that are listed.
 const PAIRS: usize = 20;
 /// Distance of the recorded slides' mean, in standard deviations of the mean, from which a texture counts as changed.
 const MOVED: f64 = 3.0;
@@ -41,7 +40,6 @@ pub struct Report {
     pub advice: Vec<String>,
 }
 
-/// A texture of the table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TextureReport {
     /// Its name.
@@ -78,7 +76,7 @@ pub struct Recorded {
     /// Mean number of slides until then, of the known ones.
     pub mean_slides: f64,
     /// Textures of the recordings that the table does not have.
-    pub not_in_table: Vec<String>,
+    pub(crate) not_in_table: Vec<String>,
 }
 
 /// The verdicts on recorded slides of one texture.
@@ -119,9 +117,6 @@ pub struct Slides {
 
 impl Report {
     /// Of a table, and of recorded slides if there are any.
-    ///
-    /// # Errors
-    /// See [`ReportError`].
     pub fn new(
         table: Table<'_>,
         slides: Option<&[Slides]>,
@@ -254,7 +249,6 @@ impl Report {
     }
 }
 
-/// Pairs that are worth a line.
 fn pairs(table: Table<'_>) -> Vec<Pair> {
     let all = (0..table.textures()).flat_map(|a| {
         (0..table.textures())

@@ -24,7 +24,6 @@ pub struct Show<'t, W> {
     table: Table<'t>,
     out: W,
     slides: u32,
-    /// The last prompt to the person.
     prompt: Option<Prompt>,
     answered: Option<(Verdict, u8)>,
     /// The first failure to write, kept until the end.
@@ -76,9 +75,6 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows the next action and its reason.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn chosen(&mut self, action: Action, expected: &[ExpectedOutcome]) -> io::Result<()> {
         writeln!(
             self.out,
@@ -93,10 +89,7 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows the features of a slide, and the textures that remain after it.
-    ///
-    /// # Errors
-    /// A failure to write.
-    pub fn slide_report(
+    pub(crate) fn slide_report(
         &mut self,
         action: Action,
         properties: &Properties,
@@ -131,18 +124,12 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows a line of something else in between.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn line(&mut self, line: &str) -> io::Result<()> {
         writeln!(self.out, "{line}")?;
         self.out.flush()
     }
 
     /// Shows a probe's event of an exploration, up to its answer; shows nothing for any other.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn event(&mut self, event: &Event) -> io::Result<()> {
         match event {
             Event::Chosen {
@@ -273,9 +260,6 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows the answer, and whether it is right.
-    ///
-    /// # Errors
-    /// The first failure to write.
     pub fn finish(mut self, verdict: Verdict, slides: u8, truth: &str) -> io::Result<()> {
         std::mem::replace(&mut self.failed, Ok(()))?;
         self.answer(verdict, slides)?;
@@ -286,7 +270,6 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
-    /// Shows the answer.
     fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
         self.answered = Some((verdict, slides));
         let name = self.table.name(verdict.texture).unwrap_or("?");
@@ -329,9 +312,6 @@ pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool>
 }
 
 /// Prints what a table holds.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,

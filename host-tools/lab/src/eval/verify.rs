@@ -18,9 +18,7 @@ use crate::eval::learn;
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
-/// Other textures that each one is compared with.
 const OTHERS: usize = 3;
-/// Points of a curve.
 const POINTS: usize = 60;
 
 /// The result of verifications.
@@ -62,12 +60,10 @@ pub struct AnswerShares {
     pub mean_slides: f64,
 }
 
-/// The comparison of the slides of one episode with one reference.
 struct Episode {
     is_same: bool,
     scores: [f64; SLIDES],
     answers: [Answer; SLIDES],
-    /// Answer and slides at the end.
     end: (Answer, usize),
 }
 
@@ -92,9 +88,6 @@ impl From<learn::TableError> for VerifyError {
 }
 
 /// Compares slides of each texture in turn with its own reference and with those of others.
-///
-/// # Errors
-/// See [`VerifyError`].
 pub fn verify(
     experiment: &Experiment,
     config: Config,
@@ -151,7 +144,6 @@ pub fn verify(
     })
 }
 
-/// Compares the slides of a run with one texture of the table.
 fn episode(
     experiment: &Experiment,
     bytes: &[u8],
@@ -257,7 +249,6 @@ fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     (equal, at_limits.into_iter().map(at).collect())
 }
 
-/// Reasons why a texture cannot be put into a table.
 #[derive(Debug, thiserror::Error)]
 pub enum PutError {
     /// The table compares the paper's properties.
@@ -271,15 +262,11 @@ pub enum PutError {
          table"
     )]
     NothingInCommon,
-    /// The table cannot be written.
     #[error("the reference does not fit into the table")]
     Encode(#[from] EncodeError),
 }
 
 /// A table with one more texture, or another one of this name, that was learned from these slides.
-///
-/// # Errors
-/// See [`PutError`].
 pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec<u8>, PutError> {
     let Contents::Fused(set, length) = table.contents() else {
         return Err(PutError::NotFused);
@@ -309,9 +296,7 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     Ok(bytes)
 }
 
-/// More bytes than one texture takes in a table.
 const MOST_OF_ONE: usize = 4096;
-/// Episodes that are drawn of each other texture.
 const DRAWN: usize = 40;
 
 /// Share of episodes of the table's other textures, drawn about their means and as long as that of `explorer`, that

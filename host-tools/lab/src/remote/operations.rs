@@ -1,6 +1,5 @@
-//! Operations on a probe that take a laboratory: its slides are held against a table here, or become recordings. The
-//! others are
-//! those of [`link::operations`](tactus_link::operations).
+//! Operations on a probe whose slides are compared with a table here, or recorded. The others are those of
+//! [`link::operations`](tactus_link::operations).
 
 use std::io::{self, Write as _};
 
@@ -14,9 +13,7 @@ use super::verifying::{Verifying, config_of};
 use crate::data::recorder::{RecordError, Recorder};
 use crate::data::recording::{Labels, Recording};
 use crate::eval::alike::{self, Alike};
-use crate::eval::refresh::{
-    Moved, NewSlide, Pair, RefreshError, Refreshed, refresh as moved_table,
-};
+use crate::eval::refresh::{Moved, NewSlide, Pair, Refreshed, refresh as moved_table};
 use crate::eval::samples::Trials;
 use crate::eval::show::Show;
 use crate::eval::verified::{Verified, print_answer, print_slide};
@@ -82,8 +79,7 @@ pub async fn verify(probe: &Probe, texture: u16, wanted: Identify) -> Result<Ver
         strategy: Strategy::Cycling,
         ..wanted
     };
-    let verifying = Verifying::new(&bytes, texture, config_of(&wanted));
-    let mut verifying = verifying.map_err(OperationError::said)?;
+    let mut verifying = Verifying::new(&bytes, texture, config_of(&wanted))?;
     let (mut prompts, mut words) = (Prompts::default(), probe.words());
     writeln!(words, "Is it {}?", verifying.reference())?;
     let request = Request::command(Command::Verify(wanted));
@@ -127,7 +123,7 @@ pub struct Recorded {
 
 impl Recorded {
     /// The slides with what is known of each, beside what is known of all.
-    pub fn labelled(&self, labels: &Labels) -> Vec<(Recording, Labels)> {
+    pub(crate) fn labelled(&self, labels: &Labels) -> Vec<(Recording, Labels)> {
         let slides = self.slides.iter().map(|(slide, moved)| {
             let labels = Labels {
                 finger: self.status.finger,
@@ -220,7 +216,8 @@ pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedP
     let bytes = probe.table().await?;
     let table = Table::read(&bytes)?;
     if !matches!(table.contents(), Contents::Fused(..)) {
-        return Err(OperationError::said(RefreshError::NotFused));
+        // it says why, before anybody has laid a sample there
+        moved_table(table, &[]).map_err(OperationError::said)?;
     }
     let (mut slides, mut left_out, mut words) = (Vec::new(), Vec::new(), probe.words());
     for (texture, name) in (0..).zip(table.names()) {
@@ -253,7 +250,6 @@ pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedP
     Ok(refreshed)
 }
 
-/// One slide of a texture at each movement.
 async fn slides_of(
     probe: &Probe,
     table: Table<'_>,

@@ -214,7 +214,6 @@ impl fmt::Display for Outcome {
 #[derive(Default)]
 struct HostLog {
     named: Vec<Named>,
-    /// Time of the first one.
     first_ns: Option<u64>,
     learned: bool,
     troubles: Vec<Failure>,
@@ -263,9 +262,6 @@ pub struct Bench<'t> {
 
 impl<'t> Bench<'t> {
     /// A calibrated rig.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn new(factory: &'t [u8]) -> Result<Self, SimError> {
         let mut rig = SimRig::new(world().setup(1, 1));
         rig.home()?;
@@ -278,9 +274,6 @@ impl<'t> Bench<'t> {
     }
 
     /// Runs a case.
-    ///
-    /// # Errors
-    /// See [`CaseError`].
     pub fn run(&self, case: &Case) -> Result<Outcome, CaseError> {
         let setup = world().setup(case.texture, case.seed);
         let mut rig = SimRig::unguarded(setup, self.unguarded);
@@ -368,7 +361,6 @@ impl<'t> Bench<'t> {
     }
 }
 
-/// The data that a probe keeps without power.
 #[derive(PartialEq)]
 struct Kept {
     table: Vec<u8>,

@@ -17,7 +17,6 @@ use tactus_world::slot::Reader;
 use tactus_world::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
-/// Interval at which the probe sends its force, ms.
 const SAYS_MS: u64 = 10;
 
 /// A rig that an arm moves.

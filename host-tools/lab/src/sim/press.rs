@@ -23,7 +23,6 @@ use tactus_world::world::Setup;
 pub const FORCE_LIMIT_N: f64 = 2.2;
 /// Textures of each world: the softest, the stiffest, and others by its seed.
 const TEXTURES: usize = 10;
-/// Stream of the seeds that a campaign draws from.
 const STREAM: u64 = 0x9e55;
 /// Times in which a torn skin loses its pressure, s: see [`Trouble::Leaking`]. Within 0.05 s it shows contact in
 /// neither signal, as the book's page of limits says.
@@ -231,9 +230,6 @@ impl Bench {
 }
 
 /// Makes one movement, on a rig that is repaired before it; the cause comes at a share of the movement's force.
-///
-/// # Errors
-/// See [`SimError`].
 pub fn make(
     rig: &mut SimRig,
     movement: Movement,

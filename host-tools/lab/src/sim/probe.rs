@@ -62,7 +62,6 @@ pub trait Driven {
     /// See [`Servo::HAS_STAGE`].
     const HAS_STAGE: bool;
 
-    /// A millisecond passes.
     fn tick(&mut self) -> &Outputs;
 
     /// Takes the end of the last movement; `None` the second time.
@@ -71,19 +70,12 @@ pub trait Driven {
     /// Its state, as a probe shows it.
     fn state(&mut self, ended: Option<Ended>) -> RigState;
 
-    /// Virtual time since power-up.
     fn now(&self) -> Duration;
 
-    /// Gives it a command.
-    ///
-    /// # Errors
-    /// It refuses that.
     fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
 
-    /// Stops the command.
     fn stop(&mut self);
 
-    /// Ends the slide early.
     fn end_slide(&mut self) {}
 
     /// See [`Servo::gravity`].
@@ -163,7 +155,6 @@ impl Driven for ArmRig {
     }
 }
 
-/// The servo of a simulated rig: virtual time passes while a task waits for it.
 pub struct SimServo<'p, H, R = SimRig> {
     rig: R,
     host: &'p RefCell<H>,
@@ -280,7 +271,6 @@ impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
     }
 }
 
-/// Passes events to the host.
 pub struct HostSink<'p, H>(&'p RefCell<H>);
 
 impl<H: Host> Events for HostSink<'_, H> {
@@ -303,9 +293,7 @@ pub type SimProbe<'p, H, R = SimRig> =
 
 /// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table
 /// that comes with the firmware. `buffer` takes the longest table.
-///
-/// # Errors
-/// The flash is too small for a store. Other faults in it are reported to the host, as by the firmware.
+/// Errors: the flash is too small for a store. Other faults in it are reported to the host, as by the firmware.
 pub fn switch_on<'p, H: Host, R: Driven>(
     rig: R,
     flash: RamFlash,
@@ -335,9 +323,6 @@ pub fn switch_on<'p, H: Host, R: Driven>(
 }
 
 /// Takes the power from a probe for a moment: it keeps the contents of its flash only. Its rig stays as it is.
-///
-/// # Errors
-/// See [`switch_on`].
 pub fn switch_off_and_on<H: Host, R: Driven>(
     probe: SimProbe<'_, H, R>,
 ) -> Result<SimProbe<'_, H, R>, StoreError> {
@@ -345,10 +330,7 @@ pub fn switch_off_and_on<H: Host, R: Driven>(
 }
 
 /// The same, and these bits of its flash change meanwhile.
-///
-/// # Errors
-/// See [`switch_on`].
-pub fn switch_off_changed_and_on<'p, H: Host, R: Driven>(
+pub(crate) fn switch_off_changed_and_on<'p, H: Host, R: Driven>(
     probe: SimProbe<'p, H, R>,
     bits: &[usize],
 ) -> Result<SimProbe<'p, H, R>, StoreError> {

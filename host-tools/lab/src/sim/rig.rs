@@ -24,9 +24,7 @@ use tactus_world::slot::Reader;
 use tactus_world::world::{Setup, World};
 
 const TICK_NS: u64 = 1_000_000;
-/// STEP stays high this long.
 const PULSE_NS: u64 = 5_000;
-/// DIR is set this long before STEP rises.
 const DIR_NS: u64 = 2_000;
 
 /// Motor current amplifier of the reference board: 1 V/A about half of 3.3 V, 12 bits.
@@ -76,9 +74,7 @@ pub struct SimRig {
     down: bool,
     next_step_ns: u64,
     outputs: Outputs,
-    /// Motor current of the last tick, A.
     current_a: f32,
-    /// P_DC words of the last tick.
     pdc: Vec<u16>,
     performed: Vec<Performed>,
 }
@@ -192,9 +188,7 @@ impl SimRig {
     }
 
     /// Puts another texture under the lifted finger.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`] while the finger is down.
+    /// Errors: [`Refused::Busy`] while the finger is down.
     pub fn place(&mut self, texture: u8) -> Result<(), SimError> {
         self.world.place(texture).map_err(|_| Refused::Busy)?;
         self.control.sample_changed();
@@ -256,7 +250,6 @@ impl SimRig {
         seconds * 1_000_000_000 + slot * 1_000_000_000 / hz
     }
 
-    /// A slot.
     fn sample(&mut self, at_ns: u64) {
         let slot = self.slot;
         self.slot += 1;
@@ -298,9 +291,7 @@ impl SimRig {
     }
 
     /// Runs the rig until it is at rest: ready, parked or faulted with the finger off the sample.
-    ///
-    /// # Errors
-    /// The fault that it came to, or that it never came to rest.
+    /// Errors: the fault that it came to, or that it never came to rest.
     pub fn rest(&mut self, mut each: impl FnMut(&Outputs)) -> Result<(), SimError> {
         let mut timeout = MovementTimeout::default();
         let mut hung = Phase::Parked;
@@ -323,9 +314,6 @@ impl SimRig {
     }
 
     /// Powers up: waits for the sensor, finds the limit switches.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn home(&mut self) -> Result<(), SimError> {
         for _ in 0..=self.reader.power_up_ms() {
             self.tick();
@@ -336,10 +324,8 @@ impl SimRig {
     }
 
     /// Does the finger's start-up list, if it has not been done.
-    ///
-    /// # Errors
-    /// A part does not answer as it must; it may be tried again.
-    pub fn start_finger(&mut self) -> Result<(), SimError> {
+    /// Errors: A part does not answer as it must; it may be tried again.
+    pub(crate) fn start_finger(&mut self) -> Result<(), SimError> {
         if self.started {
             return Ok(());
         }
@@ -360,9 +346,7 @@ impl SimRig {
 
     /// Makes one movement, beginning at `start` (0 to 1 of the length that the sample leaves); `each` gets the outputs
     /// of every tick.
-    ///
-    /// # Errors
-    /// See [`SimError`]. The stage stands then, and the finger is lifted.
+    /// Errors: see [`SimError`]. The stage stands then, and the finger is lifted.
     pub fn slide(
         &mut self,
         movement: Movement,
@@ -432,9 +416,6 @@ impl SimRig {
 
     /// Makes one movement and records it; repeats a slide with a gap, and one that failed with an error that the rig
     /// recovers from by itself. Texture and number are left at 0.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn record(&mut self, movement: Movement) -> Result<Recording, SimError> {
         let mut failed = SimError::from(Fault::Rejected);
         for _ in 0..MAX_REJECTED {
@@ -528,8 +509,6 @@ impl Rig for SimRig {
     }
 }
 
-#[cfg(test)]
-mod fingers;
 mod measuring;
 #[cfg(test)]
-mod weights;
+mod tests;

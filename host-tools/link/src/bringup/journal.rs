@@ -25,7 +25,7 @@ pub struct Entry {
     pub mistakes: Vec<EntryMistake>,
     /// What can be drawn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub series: Option<EntrySeries>,
+    pub series: Option<Series>,
 }
 
 /// Something that is wrong.
@@ -37,17 +37,6 @@ pub struct EntryMistake {
     pub what: String,
     /// What to do.
     pub remedy: String,
-}
-
-/// Points.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct EntrySeries {
-    /// What they show.
-    pub title: String,
-    /// Names of the axes.
-    pub axes: [String; 2],
-    /// The points.
-    pub points: Vec<[f64; 2]>,
 }
 
 impl Entry {
@@ -64,18 +53,13 @@ impl Entry {
                 remedy: named.mistake.remedy.to_owned(),
             }
         });
-        let series = found.series.as_ref().map(|series: &Series| EntrySeries {
-            title: series.title.to_owned(),
-            axes: series.axes.map(str::to_owned),
-            points: series.points.clone(),
-        });
         Self {
             step: step.key.to_owned(),
             at,
             passed: found.finding.passed(),
             saw: found.finding.saw.clone(),
             mistakes: mistakes.collect(),
-            series,
+            series: found.series.clone(),
         }
     }
 }

@@ -5,7 +5,7 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Identify, Live, Phase, Report};
 
 use super::judge::mounted::{self as judge, SlideSeen};
-use super::result::{Series, StepResult};
+use super::result::StepResult;
 use super::seams::{Person, Probe, Trouble};
 use super::weights;
 
@@ -102,14 +102,12 @@ impl Mounted<'_> {
             let seconds = f64::from(at_ms.wrapping_sub(first_ms)) * 1e-3;
             [seconds, f64::from(live.speed_um_s) * 1e-3]
         });
-        Ok(StepResult {
-            series: Some(Series {
-                title: "speed of the stage by its encoder, the finger in the air",
-                axes: ["s", "mm/s"],
-                points: points.collect(),
-            }),
-            finding: judge::speed(done.err().as_deref(), &places),
-        })
+        Ok(StepResult::drawn(
+            judge::speed(done.err().as_deref(), &places),
+            "speed of the stage by its encoder, the finger in the air",
+            ["s", "mm/s"],
+            points.collect(),
+        ))
     }
 
     /// The first slide.
@@ -153,13 +151,11 @@ impl Mounted<'_> {
             Ok(counts) => seen.counts = counts,
             Err(why) => seen.failed = Some(why),
         }
-        Ok(StepResult {
-            finding: judge::slide(&seen),
-            series: Some(Series {
-                title: "force by P_DC during the first slide",
-                axes: ["ms", "mN"],
-                points: seen.force,
-            }),
-        })
+        Ok(StepResult::drawn(
+            judge::slide(&seen),
+            "force by P_DC during the first slide",
+            ["ms", "mN"],
+            seen.force,
+        ))
     }
 }

@@ -11,7 +11,7 @@ use super::judge::{
     TRAVEL_MM, Went,
 };
 use super::mounted::Mounted;
-use super::result::{Series, StepResult};
+use super::result::StepResult;
 use super::seams::{Board, Person, Trouble};
 
 /// A step.
@@ -159,14 +159,12 @@ pub static STEPS: &[Step] = &[
                 .iter()
                 .zip(0..)
                 .map(|(point, at)| [f64::from(at) / 2.2, point[0]]);
-            Ok(StepResult {
-                finding: judge::noise(&seen),
-                series: Some(Series {
-                    title: "P_AC of the finger that nobody touches",
-                    axes: ["ms", "counts"],
-                    points: pac.collect(),
-                }),
-            })
+            Ok(StepResult::drawn(
+                judge::noise(&seen),
+                "P_AC of the finger that nobody touches",
+                ["ms", "counts"],
+                pac.collect(),
+            ))
         }),
     },
     Step {
@@ -280,14 +278,12 @@ pub static STEPS: &[Step] = &[
             let mut points = bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?;
             let back = bench.lever(Measure::LeverTop)?;
             points.extend(bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?);
-            Ok(StepResult {
-                finding: judge::lever_switch(&up, &down, &back),
-                series: Some(Series {
-                    title: "P_DC above its rest while the lever goes 2 mm down and up, the finger off",
-                    axes: ["mm", "counts"],
-                    points,
-                }),
-            })
+            Ok(StepResult::drawn(
+                judge::lever_switch(&up, &down, &back),
+                "P_DC above its rest while the lever goes 2 mm down and up, the finger off",
+                ["mm", "counts"],
+                points,
+            ))
         }),
     },
     Step {
@@ -352,14 +348,12 @@ pub static STEPS: &[Step] = &[
             let right = ask_stage(bench, true)?;
             let points = bench.points(1e-3, 1.0)?;
             let left = ask_stage(bench, false)?;
-            Ok(StepResult {
-                finding: judge::bridge(&right, &left),
-                series: Some(Series {
-                    title: "the motor's current while the stage goes to the right",
-                    axes: ["mm", "mA"],
-                    points,
-                }),
-            })
+            Ok(StepResult::drawn(
+                judge::bridge(&right, &left),
+                "the motor's current while the stage goes to the right",
+                ["mm", "mA"],
+                points,
+            ))
         }),
     },
     Step {
@@ -390,14 +384,12 @@ pub static STEPS: &[Step] = &[
             for point in &mut points {
                 point[0] *= 1e-3;
             }
-            Ok(StepResult {
+            Ok(StepResult::drawn(
                 finding,
-                series: Some(Series {
-                    title: "current of the resistor by the bridge's duty",
-                    axes: ["duty", "mA"],
-                    points,
-                }),
-            })
+                "current of the resistor by the bridge's duty",
+                ["duty", "mA"],
+                points,
+            ))
         }),
     },
     Step {
@@ -451,14 +443,12 @@ pub static STEPS: &[Step] = &[
             let [last, _] = bench.sensor()?.pdc;
             bench.person.done("Take the weight away")?;
             let [after, _] = bench.sensor()?.pdc;
-            Ok(StepResult {
-                finding: judge::mounted::scale(&points, last - first, after - air),
-                series: Some(Series {
-                    title: SCALE,
-                    axes: ["counts", "mN"],
-                    points,
-                }),
-            })
+            Ok(StepResult::drawn(
+                judge::mounted::scale(&points, last - first, after - air),
+                SCALE,
+                ["counts", "mN"],
+                points,
+            ))
         }),
     },
     Step {

@@ -51,7 +51,6 @@ pub(super) type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 #[derive(Debug, thiserror::Error)]
 #[error("the figure \"{figure}\" cannot be drawn; please report this")]
 pub struct DrawError {
-    /// Its title.
     figure: String,
     source: Failed,
 }

@@ -146,15 +146,6 @@ fn a_host_that_restarts_between_command_and_read_is_in_step_again() {
     assert!((2580..=2700).contains(&bus.value(0x83)));
 }
 
-#[test]
-fn a_flipped_bit_is_in_one_word_only() {
-    let mut bus = Bus::new();
-    bus.sensor.flip_bits(0x0100);
-    let bad = bus.ask([0x83, 0], GAP_NS, 2);
-    assert_eq!(bad[0].count_ones() % 2, 0);
-    bus.value(0x83);
-}
-
 /// The core's slots as data on the sensor's wire; how many of `slots` gave a word, and what the sensor complained of.
 fn on_the_wire(slots: u32, change: impl Fn(&mut [Transaction; 2])) -> (usize, Vec<(u8, u64)>) {
     let mut bus = Bus::new();

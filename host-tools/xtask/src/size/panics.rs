@@ -1,37 +1,8 @@
-//! The biggest symbols of an image, and the calls of functions that panic, by their places in the source.
+//! The calls of functions that panic in an image, by their places in the source.
 use std::collections::BTreeSet;
 
 use anyhow::Result;
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
-
-/// How many symbols are the biggest.
-const SYMBOLS: usize = 10;
-/// A function, constant or variable, and its bytes.
-#[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Symbol {
-    pub(super) bytes: u64,
-    pub(super) name: String,
-}
-
-/// The biggest symbols.
-pub(super) fn symbols(elf: &[u8]) -> Result<Vec<Symbol>> {
-    let file = object::File::parse(elf)?;
-    let sized = file.symbols().filter(|symbol| {
-        matches!(symbol.kind(), SymbolKind::Text | SymbolKind::Data) && symbol.is_definition()
-    });
-    let mut symbols = sized
-        .map(|symbol| {
-            Ok(Symbol {
-                bytes: symbol.size(),
-                name: format!("{:#}", rustc_demangle::demangle(symbol.name()?)),
-            })
-        })
-        .collect::<Result<Vec<_>>>()?;
-    symbols.sort_by(|a, b| b.cmp(a));
-    symbols.dedup();
-    symbols.truncate(SYMBOLS);
-    Ok(symbols)
-}
 
 /// What a call of a function that panics comes from.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]

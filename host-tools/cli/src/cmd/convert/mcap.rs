@@ -16,89 +16,48 @@ use tactus_core::wire::{Event, Report, SlideReport};
 use tactus_lab::data::recording::PAC_RATE_HZ;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::measure;
-use tactus_lab::remote::mcap::TABLE;
+use tactus_link::log::{self, Line, TableParts};
 
-use super::{To, create};
-use crate::cmd::device::log::{self, Line, TableParts};
+use super::To;
+use crate::cmd::table_file::opened;
 
-/// The channels, each with what its messages hold: a name, and JSON's word for what it is.
-const CHANNELS: [(&str, &[(&str, &str)]); 14] = [
-    ("/pac", &[("counts", "integer"), ("still", "boolean")]),
-    ("/pdc", &[("counts", "integer")]),
-    ("/shear", &[("mn", "integer")]),
+/// The channels, each with the fields of its messages, `name:kind` in JSON's words.
+const CHANNELS: [(&str, &str); 14] = [
+    ("/pac", "counts:integer still:boolean"),
+    ("/pdc", "counts:integer"),
+    ("/shear", "mn:integer"),
     (
         "/rig",
-        &[
-            ("force_mn", "integer"),
-            ("lever_steps", "integer"),
-            ("stage_mm", "number"),
-            ("speed_mm_s", "number"),
-            ("current_ma", "integer"),
-        ],
+        "force_mn:integer lever_steps:integer stage_mm:number speed_mm_s:number current_ma:integer",
     ),
-    ("/phase", &[("phase", "string")]),
+    ("/phase", "phase:string"),
     (
         "/movement",
-        &[
-            ("texture", "string"),
-            ("slide", "integer"),
-            ("force_n", "number"),
-            ("speed_mm_s", "number"),
-        ],
+        "texture:string slide:integer force_n:number speed_mm_s:number",
     ),
     (
         "/features",
-        &[
-            ("slide", "integer"),
-            ("traction_n", "number"),
-            ("roughness", "number"),
-            ("fineness", "number"),
-            ("ln_bands", "array"),
-            ("ln_pressure", "array"),
-        ],
+        "slide:integer traction_n:number roughness:number fineness:number ln_bands:array ln_pressure:array",
     ),
     (
         "/posterior",
-        &[
-            ("slide", "integer"),
-            ("most_likely", "string"),
-            ("probability", "number"),
-            ("all", "object"),
-        ],
+        "slide:integer most_likely:string probability:number all:object",
     ),
     (
         "/choice",
-        &[
-            ("slide", "integer"),
-            ("force_n", "number"),
-            ("speed_mm_s", "number"),
-            ("action", "object"),
-            ("expected", "array"),
-        ],
+        "slide:integer force_n:number speed_mm_s:number action:object expected:array",
     ),
     (
         "/verdict",
-        &[
-            ("name", "string"),
-            ("probability", "number"),
-            ("sure", "boolean"),
-            ("unknown", "boolean"),
-            ("changed", "boolean"),
-            ("slides", "integer"),
-        ],
+        "name:string probability:number sure:boolean unknown:boolean changed:boolean slides:integer",
     ),
     (
         "/verification",
-        &[
-            ("slides", "integer"),
-            ("score", "number"),
-            ("limit", "number"),
-            ("answer", "string"),
-        ],
+        "slides:integer score:number limit:number answer:string",
     ),
-    ("/fault", &[("fault", "string"), ("remedy", "string")]),
-    ("/request", &[("command", "object")]),
-    (LOG, &[]),
+    ("/fault", "fault:string remedy:string"),
+    ("/request", "command:object"),
+    (LOG, ""),
 ];
 /// Sentences, as Foxglove's panel of logs shows them.
 const LOG: &str = "/log";
@@ -143,7 +102,6 @@ impl Writer {
         Ok(Self { mcap, channels })
     }
 
-    /// A message at so many ns.
     fn tell(&mut self, topic: &'static str, at_ns: u64, message: &Value) -> anyhow::Result<()> {
         let (channel_id, sequence) = self.channels.get_mut(topic).context(topic)?;
         let header = MessageHeader {
@@ -200,7 +158,7 @@ impl Writer {
         Ok(self.mcap.attach(&Attachment {
             log_time: at_ns,
             create_time: at_ns,
-            name: TABLE.to_owned(),
+            name: "table.tact".to_owned(),
             media_type: "application/octet-stream".to_owned(),
             data: table.into(),
         })?)
@@ -212,15 +170,15 @@ impl Writer {
     }
 }
 
-/// The schema of an object with such fields.
-fn schema(fields: &[(&str, &str)]) -> Value {
-    let properties = fields.iter().map(|(name, kind)| {
-        // what a rig does not measure is null
-        let kind = match *kind {
+/// The schema of an object with such fields; what a rig does not measure is null.
+fn schema(fields: &str) -> Value {
+    let fields = fields.split(' ').filter_map(|field| field.split_once(':'));
+    let properties = fields.map(|(name, kind)| {
+        let kind = match kind {
             "number" => json!(["number", "null"]),
             kind => json!(kind),
         };
-        ((*name).to_owned(), json!({ "type": kind }))
+        (name.to_owned(), json!({ "type": kind }))
     });
     let properties: Map<String, Value> = properties.collect();
     json!({"type": "object", "properties": properties})
@@ -289,10 +247,9 @@ pub(super) fn recordings(
     to.finish()
 }
 
-/// A log, by the probe's own clock.
 pub(super) fn log(to: To, from: &Path) -> anyhow::Result<()> {
     let mut log = Converted::new(to, from)?;
-    log::read(from, |line| {
+    log::read(opened(from)?, |line| {
         if log.failed.is_ok() {
             log.failed = log.line(&line);
         }
@@ -300,32 +257,6 @@ pub(super) fn log(to: To, from: &Path) -> anyhow::Result<()> {
     .with_context(|| from.display().to_string())?;
     log.failed?;
     log.to.finish()
-}
-
-/// A probe's reports, written as they come.
-pub(crate) struct Live(Converted);
-
-impl Live {
-    /// Begins a file of what the probe at this port says.
-    pub(crate) fn create(path: &Path, port: &str) -> anyhow::Result<Self> {
-        let mut converted = Converted::new(create(path)?, Path::new(port))?;
-        let by = concat!("written by tactus ", env!("CARGO_PKG_VERSION"));
-        converted.to.log(0, INFO, by)?;
-        Ok(Self(converted))
-    }
-
-    /// Writes a report, unless one before it could not be written.
-    pub(crate) fn hear(&mut self, report: &Report, written: &mut anyhow::Result<()>) {
-        if written.is_ok() {
-            self.0.now_ns = u64::from(report.at_ms) * 1_000_000;
-            *written = self.0.report(report);
-        }
-    }
-
-    /// Ends the file: without it, readers have no index.
-    pub(crate) fn finish(self) -> anyhow::Result<()> {
-        self.0.to.finish()
-    }
 }
 
 struct Converted {

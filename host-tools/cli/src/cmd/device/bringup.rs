@@ -16,7 +16,7 @@ use tactus_link::bringup::{
 
 use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
-use crate::cmd::output::{Format, print_json};
+use crate::cmd::output::Format;
 
 /// Bring up a new rig: check its parts and wires step by step, and name what is wrong
 #[derive(clap::Args)]
@@ -28,7 +28,7 @@ Examples:
   tactus device bringup --report rig2      another rig
 
 Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each step that is over is
-kept in DIR/journal.jsonl; DIR/report.txt, report.json and the curves beside them are to be sent to somebody who helps.
+kept in DIR/journal.jsonl; DIR/report.txt and report.json, with the curves, are to be sent to somebody who helps.
 Ctrl-C stops whatever moves; the exit code is 130 then. It is 1 while a step has not passed.")]
 pub(crate) struct Args {
     /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
@@ -40,9 +40,6 @@ pub(crate) struct Args {
     /// List the steps, and what has passed in DIR, without a board
     #[arg(long)]
     list: bool,
-    /// How to print the report
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
 /// A board that starts answers within this.
@@ -55,7 +52,6 @@ const TRIES: u32 = 3;
 /// The board listens for a second when it starts.
 const HELLO: Duration = Duration::from_millis(200);
 
-/// Goes through the steps.
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if how.list {
         let journal = how.report.join("journal.jsonl");
@@ -99,13 +95,10 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     };
     let report = Report::new(&journal);
     report.write(&how.report)?;
-    match how.format {
-        Format::Text => write!(out, "{}", report.text())?,
-        Format::Json => print_json(&report, out)?,
-    }
+    write!(out, "{}", report.text())?;
     out.flush()?;
     let folder = how.report.display();
-    eprintln!("The report is in {folder}: report.txt, report.json and curves.");
+    eprintln!("The report is in {folder}: report.txt and report.json.");
     match done.map_err(BenchError::BringUp)? {
         Ended::Passed => {
             eprintln!(
@@ -120,7 +113,6 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The rig's firmware at the other end of the link.
 struct Linked(Bench);
 
 impl Probe for Linked {
@@ -129,7 +121,7 @@ impl Probe for Linked {
         command: Command,
         each: &mut dyn FnMut(&ProbeReport),
     ) -> Result<Result<(), String>, Trouble> {
-        let probe = self.0.probe();
+        let probe = self.0.probe.clone();
         let done = probe.run(Request::command(command), |report| {
             each(report);
             Ok(())
@@ -164,7 +156,6 @@ fn list(journal: Option<Journal>, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The self-test at the other end of a serial line.
 struct Serial {
     open: Open,
     line: Line,

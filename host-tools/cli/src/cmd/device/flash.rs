@@ -28,10 +28,8 @@ pub(crate) struct Args {
     options: Vec<OsString>,
 }
 
-/// The chip's name in probe-rs.
 const CHIP: &str = "STM32F429ZITx";
 
-/// Flashes an image with probe-rs, or prints how.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     ensure!(
         args.dry_run || args.elf.is_file(),
@@ -70,7 +68,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// That the program is here, and a debug probe.
 fn look_for_probe(program: &str) -> anyhow::Result<()> {
     let list = match Command::new(program).arg("list").output() {
         Err(e) if e.kind() == io::ErrorKind::NotFound => bail!(

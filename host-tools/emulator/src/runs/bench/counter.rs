@@ -1,4 +1,5 @@
-//! The bench inside the silicon image on the emulated chip: gives it work, and holds what it finds against the plain kernels on this PC.
+//! The bench inside the silicon image on the emulated chip: gives it work, and holds what it finds against the plain
+//! kernels on this PC.
 
 use std::path::Path;
 
@@ -7,13 +8,11 @@ use tactus_world::world::Setup;
 
 use super::error::BenchError;
 use super::workload::{self, Counter, Workload};
-use crate::board::cycles::CycleCount;
 use crate::board::{Emulator, Options};
 
 /// What the chip found.
 pub(super) struct Counted {
     pub(super) instructions: u64,
-    pub(super) cycles: Option<f64>,
     pub(super) equal: bool,
 }
 
@@ -22,8 +21,6 @@ pub(super) struct Bench {
     desk: u64,
     plan: Plan,
     overhead: u64,
-    /// Whether each instruction goes through the model of the cycles.
-    traces: bool,
 }
 
 /// What has the silicon image serve the bench.
@@ -57,25 +54,19 @@ fn unsuitable(workload: Workload, what: &'static str) -> BenchError {
 }
 
 impl Bench {
-    /// Boots the silicon image as bench, to count cycles, too, where it `traces`.
-    pub(super) fn start(elf: &Path, traces: bool) -> Result<Self, BenchError> {
+    /// Boots the silicon image as bench.
+    pub(super) fn start(elf: &Path) -> Result<Self, BenchError> {
         let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
         let (wanted, _) = emulator.symbol("BENCH_WANTED")?;
         emulator.write(wanted, &WANTED.to_le_bytes())?;
         let (desk, _) = emulator.symbol("BENCH_DESK")?;
-        // where the chip says that it counts
-        let (counts, _) = emulator.symbol("BENCH_COUNTS")?;
         // the clocks are up by then
         emulator.run_ms(20)?;
-        if traces {
-            emulator.trace_cycles(Vec::new(), Some(counts))?;
-        }
         let mut bench = Self {
             emulator,
             desk,
             plan: Plan::new(),
             overhead: 0,
-            traces,
         };
         bench.overhead = bench.send(Workload::Nothing, &[], &[])?.0;
         Ok(bench)
@@ -148,20 +139,14 @@ impl Bench {
         table: &[u8],
         words: &[i16],
     ) -> Result<Counted, BenchError> {
-        // what the one before has left
-        self.emulator.cycle_profile()?;
         let (instructions, results) = self.send(workload, table, words)?;
-        let spent: CycleCount = self.emulator.cycle_profile()?.total(0..1);
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);
         workload::run(workload, &self.plan, table, words, &mut Uncounted, &mut put)
             .ok_or_else(|| unsuitable(workload, "its words make no sense"))?;
         let instructions = instructions.saturating_sub(self.overhead);
-        // the few instructions round them are told apart by what they take on the average
-        let cycles = self.traces.then(|| spent.ratio() * instructions as f64);
         Ok(Counted {
             instructions,
-            cycles,
             equal: results == expected,
         })
     }

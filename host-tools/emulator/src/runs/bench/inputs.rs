@@ -90,8 +90,8 @@ fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
     Ok(learn::learn(method, None, &names, &MOVEMENTS, &slides)?)
 }
 
-/// The table that decisions are counted with: of made-up numbers, and not of the simulated world as the factory table is, so
-/// that a figure tells of the code.
+/// The table that decisions are counted with: of made-up numbers, and not of the simulated world as the factory table
+/// is, so that a figure tells of the code.
 pub(super) fn of_gates(method: Method) -> Result<Vec<u8>, BenchError> {
     synthetic(method, OF_GATES)
 }

@@ -7,18 +7,18 @@ use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Identify, Phase};
 use tactus_world::world::Setup;
 
-use super::cycles::{CORE_HZ, Cycles};
 use super::error::BenchError;
 use super::gates::gate;
 use super::row::Row;
-use crate::board::{Emulator, HandlerProfile, Options, Output};
+use super::slowed::CORE_HZ;
+use crate::board::{Emulator, Options, Output};
 use crate::host::talk::Talk;
 
 /// Longest that the rig takes for anything, virtual seconds.
 const TIMEOUT_S: f64 = 120.0;
 
-/// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period of
-/// its rate later.
+/// The last sample is up to a tick of 1 ms old when the servo has the lever step up, and the first step comes a period
+/// of its rate later.
 const BEFORE_STEP_NS: u64 = 1_000_000 + 1_000_000_000 / RETRACT_STEPS_S.unsigned_abs() as u64;
 
 /// When the lever's driver got its first step since the slide began: the end of the slide, as the pins show it.
@@ -29,12 +29,8 @@ fn first_step_up(board: &mut Emulator, since_ns: u64) -> Option<u64> {
     })
 }
 
-/// Load and latency of the rig's image while it makes a slide; the cycles are of another run.
-pub(super) fn on_the_rig(
-    elf: &Path,
-    finger: FingerName,
-    cycles: Option<&Cycles>,
-) -> Result<Vec<Row>, BenchError> {
+/// Measures load and latency of the rig's image while it makes a slide.
+pub(super) fn on_the_rig(elf: &Path, finger: FingerName) -> Result<Vec<Row>, BenchError> {
     let options = Options {
         trace_s: 2,
         ..Options::default()
@@ -84,10 +80,7 @@ pub(super) fn on_the_rig(
     if let Some(why) = failed {
         return Err(why.into());
     }
-    let profiles = talk.board().handlers()?;
-    let [timer, bus] = profiles[..] else {
-        return Err(BenchError::Rig("its handlers were not counted"));
-    };
+    let counted = talk.board().handlers()?;
     let begun = begun.ok_or(BenchError::Rig("it says nothing of a slide"))?;
     let over = over.ok_or(BenchError::Rig("the slide does not end"))?;
     let (told_ns, _) = told.ok_or(BenchError::Rig("there is no verdict"))?;
@@ -97,57 +90,22 @@ pub(super) fn on_the_rig(
     let slots = (talk.board().rig().sensor_commands() - commands) as f64;
     let seconds = (over.0 - begun.0) as f64 * 1e-9;
     let busy = (over.1 - begun.1) as f64 / (seconds * CORE_HZ);
-    let row = |kernel: &str, unit, measured, cycles| Row {
+    let row = |kernel: &str, unit, measured| Row {
         kernel: kernel.into(),
         unit,
         instructions: measured,
-        cycles,
         gate: gate(kernel),
         cmsis: None,
         floor: None,
         equal: true,
     };
-    let slot = (timer.instructions + bus.instructions) as f64 / slots;
-    // each comes twice a slot; what begins or ends a slot is the longer turn
-    let turns = |profile: &HandlerProfile| {
-        let [one, other] = profile.by_turns;
-        [one.max(other), one.min(other)].map(|instructions| instructions as f64 / slots)
-    };
-    let ([begins, asks], [answered, sent]) = (turns(&timer), turns(&bus));
     let late_ms = (told_ns + BEFORE_STEP_NS - lifts_ns) as f64 * 1e-6;
-    let slot = row(
-        "slot, not waiting",
-        "slot",
-        slot,
-        cycles.map(Cycles::of_slot),
-    );
+    let slot = row("slot, not waiting", "slot", counted as f64 / slots);
     // the gate is a BioTac's; other fingers' slots have filters, and differ from each other
-    let is_biotac = finger == FingerName::Biotac;
-    let mut rows = vec![Row {
-        gate: slot.gate.filter(|_| is_biotac),
-        ..slot
-    }];
-    if is_biotac {
-        rows.extend([
-            row("- begins, command goes out", "slot", begins, None),
-            row("- command is over", "slot", sent, None),
-            row("- answer is asked for", "slot", asks, None),
-            row("- answer is over, decoded, queued", "slot", answered, None),
-        ]);
-    }
-    rows.extend([
-        row(
-            "core busy during a slide",
-            "% at 168 MHz",
-            100.0 * busy,
-            cycles.map(|cycles| 100.0 * cycles.busy()),
-        ),
-        row(
-            "last sample to the verdict on the link",
-            "ms",
-            late_ms,
-            None,
-        ),
-    ]);
-    Ok(rows)
+    let gate = slot.gate.filter(|_| finger == FingerName::Biotac);
+    Ok(vec![
+        Row { gate, ..slot },
+        row("core busy during a slide", "% at 168 MHz", 100.0 * busy),
+        row("last sample to the verdict on the link", "ms", late_ms),
+    ])
 }

@@ -7,7 +7,6 @@ pub(super) struct Row {
     pub(super) kernel: String,
     pub(super) unit: &'static str,
     pub(super) instructions: f64,
-    pub(super) cycles: Option<f64>,
     pub(super) gate: Option<f64>,
     /// CMSIS-DSP in an expert's hands (gcc 12, -O3, counted by QEMU), and the floor of the instruction set (estimated).
     pub(super) cmsis: Option<f64>,
@@ -40,8 +39,8 @@ pub(super) fn print(rows: &[Row], source: &str) {
         Some(n) => format!("{n:.0}"),
     };
     println!(
-        "{:48} {:16} {:>12} {:>9} {:>9} {:>9} {:>6}  {:>9}",
-        "kernel", "unit", "instructions", "cycles", "CMSIS", "floor", "ratio", "gate"
+        "{:48} {:16} {:>12} {:>9} {:>9} {:>6}  {:>9}",
+        "kernel", "unit", "instructions", "CMSIS", "floor", "ratio", "gate"
     );
     for row in rows {
         let ratio = row.floor.or(row.cmsis).map(|to| row.instructions / to);
@@ -52,11 +51,10 @@ pub(super) fn print(rows: &[Row], source: &str) {
             (Some(_), true) => "  MISSED",
         };
         println!(
-            "{:48} {:16} {:>12} {:>9} {:>9} {:>9} {:>6}  {:>9}{verdict}",
+            "{:48} {:16} {:>12} {:>9} {:>9} {:>6}  {:>9}{verdict}",
             row.kernel,
             row.unit,
             number(Some(row.instructions)),
-            number(row.cycles),
             number(row.cmsis),
             number(row.floor),
             ratio.map_or("-".into(), |ratio| format!("{ratio:.2}")),
@@ -64,7 +62,7 @@ pub(super) fn print(rows: &[Row], source: &str) {
         );
     }
     println!(
-        "\nInstructions by the core's counter on the emulated board; the slide is {source}; results compared with the plain\n\
-         kernels on this PC, to the bit. Ratio: to the floor where one is known, else to CMSIS-DSP. Cycles are a model."
+        "\nInstructions by the core's counter on the emulated board; the slide is {source}; results compared with\n\
+         the plain kernels on this PC, to the bit. Ratio: to the floor where one is known, else to CMSIS-DSP."
     );
 }

@@ -1,7 +1,8 @@
-//! One case on the emulated board: the firmware, unmodified, is asked for something over its link while the rig, the link or the
-//! chip breaks. Judged by the world, by the pins and by what the flash holds.
+//! One case on the emulated board: the firmware, unmodified, is asked for something over its link while the rig, the
+//! link or the chip breaks. Judged by the world, by the pins and by what the flash holds.
 
 use std::path::Path;
+use std::time::Duration;
 
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
@@ -10,10 +11,10 @@ use tactus_core::rig::Fault as Named;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::biotac;
 use tactus_core::wire::{Command, Event, Identify, Phase, Report};
-use tactus_lab::sim::fault_case::naming::{self, Naming};
+use tactus_lab::sim::fault_case::naming;
 use tactus_lab::sim::fault_case::{
-    Activity, Case, HOMINGS, LIFTED_N, SHARE, STANDS_MM_S, STILL_MM, STILL_MS, frees_the_finger,
-    world,
+    Activity, Case, HOMINGS, LIFTED_N, Outcome, SHARE, STANDS_MM_S, STILL_MM, STILL_MS,
+    frees_the_finger, world,
 };
 use tactus_lab::sim::press::FORCE_LIMIT_N;
 use tactus_link::Request;
@@ -31,8 +32,9 @@ const ONE_IN: u32 = 4;
 const LOOK_MS: u64 = 10;
 /// A rig is at rest at the latest after this, virtual s: homing takes a fraction of it.
 const REST_S: u64 = 60;
-/// No request takes longer than so many times what it usually takes, and this, virtual ms: with a torn skin each movement is tried
-/// twice, with homing and a search for the sample between, and the rig on the PC answers after four minutes.
+/// No request takes longer than so many times what it usually takes, and this, virtual ms: with a torn skin each
+/// movement is tried twice, with homing and a search for the sample between, and the rig on the PC answers after four
+/// minutes.
 const SLOWER: u64 = 4;
 /// See [`SLOWER`].
 const SLOWER_MS: u64 = 240_000;
@@ -136,25 +138,6 @@ impl BoardCase {
     fn interrupts(&self) -> bool {
         self.upsets.iter().any(|(_, upset)| upset.interrupts())
     }
-}
-
-/// What became of it.
-#[derive(Clone, PartialEq, Debug)]
-pub struct BoardOutcome {
-    /// Largest force on the finger until the end of the request, N.
-    pub force_max_n: f64,
-    /// Why the request was not done.
-    pub refused: Option<String>,
-    /// The faults that the firmware named.
-    pub named: Vec<Named>,
-    /// How well they fit what broke of the rig.
-    pub naming: Naming,
-    /// What is not as it must be.
-    pub wrong: Vec<String>,
-    /// Times that the chip started anew.
-    pub resets: usize,
-    /// Virtual time.
-    pub virtual_s: f64,
 }
 
 /// What the firmware holds, by its own account.
@@ -307,7 +290,7 @@ impl<'e> BoardBench<'e> {
     ///
     /// # Errors
     /// The emulator, or a board that does not start before anything broke.
-    pub fn run(&self, drawn: &BoardCase) -> Result<BoardOutcome, TalkError> {
+    pub fn run(&self, drawn: &BoardCase) -> Result<Outcome, TalkError> {
         let case = &drawn.case;
         let mut wrong = Vec::new();
         let mut talk = self.start(case, self.store.clone())?;
@@ -375,14 +358,14 @@ impl<'e> BoardBench<'e> {
         repaired(&mut talk, &mut ear, case, &mut wrong)?;
         let after = Kept::of(&mut talk, &mut ear)?;
         self.restarted(&mut talk, case, &after, &mut wrong)?;
-        Ok(BoardOutcome {
+        Ok(Outcome {
+            case: case.clone(),
             force_max_n,
             refused: asked.err(),
             named,
             naming,
             wrong,
-            resets,
-            virtual_s: talk.now_ns() as f64 * 1e-9,
+            took: Duration::from_nanos(talk.now_ns()),
         })
     }
 

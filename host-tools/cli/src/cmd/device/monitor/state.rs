@@ -4,20 +4,16 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use tactus_core::features::Movement;
-use tactus_core::table::{Action, Name, Table};
+use tactus_core::table::Action;
 use tactus_core::wire::{
     Command, Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status,
 };
-use tactus_lab::eval::alike;
 use tactus_lab::eval::show::count;
-use tactus_lab::remote::say::most_like;
 
 /// P_AC samples that are shown: a second.
 pub(crate) const SHOWN: usize = 2200;
-/// Notes that are kept.
 pub(crate) const NOTES: usize = 50;
 
-/// How much a note matters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Weight {
     Message,
@@ -42,12 +38,9 @@ pub(crate) struct Chosen {
     pub(crate) leaves: Option<f32>,
 }
 
-/// What is known of the probe.
 pub(crate) struct Monitor {
     pub(crate) place: String,
     pub(crate) names: Vec<String>,
-    /// of the table that these are from
-    pub(crate) table_crc: u32,
     pub(crate) status: Status,
     pub(crate) at_ms: u32,
     pub(crate) live: Option<Live>,
@@ -67,12 +60,6 @@ pub(crate) struct Monitor {
     pub(crate) rebooted: bool,
     /// the user has had the rig stopped: what is still on the line is of what was stopped
     stopped: bool,
-    /// the help is shown
-    pub(crate) help: bool,
-    /// a name that is typed, to teach
-    pub(crate) typed: Option<String>,
-    /// it has learned a texture from the user since its table was read
-    learned: Option<Name>,
     /// what a person was asked to do last
     prompt: Option<Prompt>,
 }
@@ -82,7 +69,6 @@ impl Monitor {
         Self {
             place: place.to_owned(),
             names,
-            table_crc: status.table_crc,
             at_ms: 0,
             live: None,
             pac: VecDeque::new(),
@@ -96,15 +82,11 @@ impl Monitor {
             protocol: None,
             rebooted: false,
             stopped: false,
-            help: false,
-            typed: None,
-            learned: None,
             prompt: None,
             status,
         }
     }
 
-    /// Keeps a line for people.
     pub(crate) fn note(&mut self, weight: Weight, text: impl Into<String>) {
         self.notes.push_back(Note {
             at_ms: self.at_ms,
@@ -131,8 +113,6 @@ impl Monitor {
                 "identify".to_owned()
             }
             Command::Home => "home".to_owned(),
-            Command::Label(name) => format!("teach {name}"),
-            Command::Train(train) => format!("train {}", train.name),
             _ => return,
         };
         self.note(Weight::Message, note);
@@ -150,25 +130,10 @@ impl Monitor {
         matches!(self.status.phase, Phase::Background | Phase::Sliding)
     }
 
-    /// Takes in the probe's table, and compares what was learned last with the rest of it.
-    pub(crate) fn take_table(&mut self, table: Table<'_>) {
-        self.names = table.names().map(str::to_owned).collect();
-        self.table_crc = table.crc();
-        let learned = self.learned.take().and_then(|name| table.find(&name));
-        if let Some(nearest) = learned.and_then(|texture| alike::nearest(table, texture)) {
-            self.note(Weight::Message, most_like(&nearest));
-            if nearest.feels_the_same {
-                let note = "to it the two feel the same: one texture? If not, consider more trials";
-                self.note(Weight::Fault, note);
-            }
-        }
-    }
-
     pub(crate) fn name(&self, texture: usize) -> &str {
         self.names.get(texture).map_or("?", String::as_str)
     }
 
-    /// Takes in a report.
     pub(crate) fn hear(&mut self, report: &Report) {
         self.at_ms = report.at_ms;
         match &report.event {
@@ -276,7 +241,6 @@ impl Monitor {
                 };
                 let slides = count(slides, "slide");
                 let note = format!("it has learned {name} {whom}: {slides}");
-                self.learned = (!learned.itself).then(|| name.clone());
                 self.note(Weight::Message, note);
             }
             Event::Block(block) => {
@@ -292,18 +256,7 @@ impl Monitor {
                     self.note(Weight::Message, format!("the display says: {prompt}"));
                 }
             }
-            Event::Damaged(_)
-            | Event::Pdc(_)
-            | Event::Weighed { .. }
-            | Event::Turned { .. }
-            | Event::Verified { .. }
-            | Event::Early(_)
-            | Event::Arm(_)
-            | Event::Done(_)
-            | Event::Refused { .. }
-            | Event::TrainingSlide { .. }
-            | Event::Calibration(_)
-            | Event::TablePart { .. } => {}
+            _ => {}
         }
     }
 

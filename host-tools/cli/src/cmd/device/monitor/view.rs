@@ -2,20 +2,18 @@
 //! nothing that is not also said in words.
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Flex, Layout, Rect};
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{
-    Axis, Block, BorderType, Chart, Clear, Dataset, GraphType, Paragraph, Sparkline,
-};
+use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph, Sparkline};
 use tactus_core::dsp::{BIN_HZ, Plan, SpectrumSum};
 use tactus_core::features::Property;
 use tactus_core::wire::Phase;
 use tactus_lab::eval::show::count;
 use tactus_link::say::phase_name;
 
-use super::keys::KEYS;
+use super::KEYS;
 use super::state::{Monitor, SHOWN, Weight};
 
 // of the 256 colours that every terminal has, the nearest to Okabe's and Ito's
@@ -35,11 +33,8 @@ const WORTH_LISTING: f32 = 0.001;
 /// The lever's step, mm (the reference rig's).
 const STEP_MM: f32 = 0.000_625;
 
-/// Columns and lines that it needs; and columns from which three panels stand side by side.
-const LEAST: (u16, u16) = (60, 21);
-const WIDE: u16 = 76;
+const LEAST: (u16, u16) = (76, 21);
 
-/// Draws all.
 pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     let area = frame.area();
     let (width, height) = LEAST;
@@ -51,24 +46,21 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
         frame.render_widget(Paragraph::new(text), area);
         return;
     }
-    let roomy = area.height >= 34;
     let [header, charts, panels, notes, keys] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Min(6),
-        Constraint::Length(if roomy { 13 } else { 9 }),
-        Constraint::Length(if roomy { 8 } else { 4 }),
+        Constraint::Length(9),
+        Constraint::Length(4),
         Constraint::Length(1),
     ])
     .areas(area);
     let [trace, spectrum] = Layout::horizontal([Constraint::Fill(1); 2]).areas(charts);
-    let [rig, rest] =
-        Layout::horizontal([Constraint::Length(24), Constraint::Fill(1)]).areas(panels);
-    let [slide, textures] = if area.width >= WIDE {
-        Layout::horizontal([Constraint::Length(22), Constraint::Fill(1)]).areas(rest)
-    } else {
-        // what is measured gives way to what it may be
-        Layout::vertical([Constraint::Length(3), Constraint::Fill(1)]).areas(rest)
-    };
+    let [rig, slide, textures] = Layout::horizontal([
+        Constraint::Length(24),
+        Constraint::Length(22),
+        Constraint::Fill(1),
+    ])
+    .areas(panels);
     draw_header(monitor, frame, header);
     draw_trace(monitor, frame, trace);
     draw_spectrum(monitor, frame, spectrum);
@@ -76,23 +68,11 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
     draw_slide(monitor, frame, slide);
     draw_textures(monitor, frame, textures);
     draw_notes(monitor, frame, notes);
-    frame.render_widget(last_line(monitor, keys.width), keys);
-    if monitor.help {
-        draw_help(frame, area);
-    }
-}
-
-fn draw_help(frame: &mut Frame<'_>, area: Rect) {
-    let lines = KEYS.map(|(key, _, what)| {
+    let spans = KEYS.map(|(key, what)| {
         let key = Span::from(format!(" {key} ")).bold().reversed();
-        Line::from(vec![key, Span::from(format!("  {what}"))])
+        [key, Span::from(format!(" {what}   "))]
     });
-    let widest = lines.iter().map(Line::width).max().unwrap_or(0);
-    let size = [widest + 2, lines.len() + 2].map(|size| Constraint::Length(size as u16));
-    let [area] = Layout::horizontal([size[0]]).flex(Flex::Center).areas(area);
-    let [area] = Layout::vertical([size[1]]).flex(Flex::Center).areas(area);
-    frame.render_widget(Clear, area);
-    frame.render_widget(Paragraph::new(lines.to_vec()).block(panel(" Keys ")), area);
+    frame.render_widget(Line::from(spans.concat()), keys);
 }
 
 fn panel(title: impl Into<Line<'static>>) -> Block<'static> {
@@ -178,16 +158,6 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
                 .labels([-top, 0.0, top].map(|label| dim(format!("{label:>5}")))),
         );
     frame.render_widget(chart, area);
-    if pac.is_empty() && area.height > 4 {
-        let hint = Rect {
-            x: area.x + 8,
-            y: area.y + area.height / 2 - 1,
-            width: area.width.saturating_sub(9),
-            height: 1,
-        };
-        let text = Line::from(dim("drawn while sliding"));
-        frame.render_widget(text, hint);
-    }
 }
 
 fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
@@ -198,9 +168,6 @@ fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let block = panel(title);
     let inner = block.inner(area);
     frame.render_widget(block, area);
-    if inner.height < 2 || inner.width < 20 {
-        return;
-    }
     let [bars, axis] = Layout::vertical([Constraint::Min(1), Constraint::Length(1)]).areas(inner);
     let pac: Vec<i16> = monitor.pac.iter().copied().collect();
     let mut sum = SpectrumSum::default();
@@ -277,16 +244,6 @@ fn draw_rig(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
             ]);
         }
     }
-    // where there is room, what was counted since the probe has power
-    if inner.height > 8 {
-        let counts = &monitor.status.counts;
-        lines.resize(8, Line::default());
-        lines.extend([
-            row("late", format!("{:5}", counts.late_slots)),
-            row("parity", format!("{:5}", counts.parity_errors)),
-            row("lost", format!("{:5}", counts.lost_samples)),
-        ]);
-    }
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
@@ -315,17 +272,6 @@ fn gauge(force_n: f32, wanted_n: Option<f32>, width: u16) -> Line<'static> {
 fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let mut title = " Slide ".to_owned();
     let mut lines = Vec::new();
-    if area.height < 5 {
-        // a single line: what is made, and for what
-        let made = monitor.chosen.map_or_else(String::new, |chosen| {
-            title += &format!("{} ", chosen.slide);
-            let property = chosen.action.property;
-            let looked_at = property.map_or("all features", Property::name);
-            format!("{}, for {looked_at}", chosen.movement)
-        });
-        frame.render_widget(Paragraph::new(made).block(panel(title)), area);
-        return;
-    }
     if let Some(chosen) = monitor.chosen {
         title += &format!("{} ", chosen.slide);
         let property = chosen.action.property;
@@ -421,21 +367,4 @@ fn draw_notes(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
         })
         .collect();
     frame.render_widget(Paragraph::new(lines).block(block), area);
-}
-
-/// The keys, or the name that is typed.
-fn last_line(monitor: &Monitor, width: u16) -> Line<'static> {
-    if let Some(typed) = &monitor.typed {
-        return Line::from(vec![
-            Span::from(" teach ").bold().reversed(),
-            Span::from(format!(" {typed}▏ ")),
-            dim("Enter, Tab: a known name, Esc: not"),
-        ]);
-    }
-    let gap = if width >= 90 { "   " } else { "" };
-    let spans = KEYS.map(|(key, what, _)| {
-        let key = Span::from(format!(" {key} ")).bold().reversed();
-        [key, Span::from(format!(" {what} {gap}"))]
-    });
-    Line::from(spans.concat())
 }
