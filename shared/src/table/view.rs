@@ -47,30 +47,18 @@ impl<'a> Table<'a> {
             wanted,
         };
         let header: [u8; HEADER] = array(bytes, 0).ok_or(truncated(HEADER))?;
-        let [magic @ .., _, _, _, _, _, _, _, _, _, _, _, _] = header;
+        let magic = array(&header, 0).unwrap_or_default();
         if magic != MAGIC {
             return Err(TableError::Magic(magic));
         }
-        let [
-            ..,
-            v0,
-            v1,
-            code,
-            what,
-            l0,
-            l1,
-            l2,
-            l3,
-            t0,
-            t1,
-            movements,
-            features,
-        ] = header;
-        let version = u16::from_le_bytes([v0, v1]);
+        let number = |at| array(&header, at).map_or(0, u16::from_le_bytes);
+        let (version, textures) = (number(4), number(12));
+        let [code, what] = array(&header, 6).unwrap_or_default();
+        let [movements, features] = array(&header, 14).unwrap_or_default();
         if version != VERSION {
             return Err(TableError::Version(version));
         }
-        let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
+        let length = array(&header, 8).map_or(0, u32::from_le_bytes) as usize;
         let bytes = bytes.get(..length).ok_or(truncated(length))?;
         let (body, stored) = bytes.split_last_chunk().ok_or(TableError::Length {
             header: length,
@@ -81,7 +69,6 @@ impl<'a> Table<'a> {
             return Err(TableError::Crc { stored, computed });
         }
         let contents = Contents::from_codes([code, what, features])?;
-        let textures = u16::from_le_bytes([t0, t1]);
         if textures == 0 || movements == 0 || usize::from(movements) > MAX_MOVEMENTS {
             return Err(TableError::Header);
         }

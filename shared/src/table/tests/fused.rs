@@ -134,16 +134,6 @@ proptest! {
     #![proptest_config(fixed(512))]
 
     #[test]
-    fn no_damage_makes_a_fused_table_panic(changes in proptest::collection::vec((6usize..95, any::<u8>()), 1..4), length in 12usize..120) {
-        read_all(&wrong_fused(|bytes| for &(at, byte) in &changes { bytes[at] = byte; }));
-        read_all(&wrong_fused(|bytes| {
-            for &(at, byte) in &changes { bytes[at] = byte; }
-            bytes.resize(length, 0);
-            bytes[8] = (length + CRC_BYTES) as u8;
-        }));
-    }
-
-    #[test]
     fn no_bytes_behind_a_fused_header_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), set in 0u8..4, features in 0u8..15) {
         let length = (16 + bytes.len() + CRC_BYTES) as u32;
         let mut begun = b"TACT\x01\0\x01".to_vec();

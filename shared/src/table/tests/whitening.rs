@@ -246,19 +246,6 @@ fn the_farthest_values_do_not_overflow() {
 }
 
 #[test]
-fn what_was_learned_reads_back() {
-    let noise = &mut Noise(3);
-    for features in 1..=MAX_FEATURES {
-        let world = World::new(noise, 4, 2, features);
-        for whitening in learned(&world.slides(noise, 3)) {
-            let bytes = whitening.as_bytes();
-            assert_eq!(bytes.len(), Whitening::bytes(features));
-            assert_eq!(Whitening::read(bytes, features).as_ref(), Some(&whitening));
-        }
-    }
-}
-
-#[test]
 fn without_two_slides_of_a_texture_there_is_no_whitening() {
     let slide = |x: i16| Vector::from_slice(&[x, 2 * x]).unwrap();
     let mut scatter = Scatter::new(2);
