@@ -1,7 +1,5 @@
-//! What the tests share: where the recordings are, how a test says that it was skipped, what is expected to fail, a table of
-//! properties.
+//! Parts that the tests share: recordings, skipped tests, seeds, a table of properties.
 use std::io::Write as _;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 pub mod numpy;
@@ -47,24 +45,23 @@ pub fn skipped(why: &str) {
     }
 }
 
-/// Runs a test of which it is known that it fails, and why: it passes if `test` panics with `because` in its message, and
-/// fails if `test` passes. For a model that has learned an effect before the firmware is ready for it.
-pub fn expected_to_fail(because: &str, test: impl FnOnce()) {
-    let Err(panic) = catch_unwind(AssertUnwindSafe(test)) else {
-        panic!("it passes now: take away the mark that it fails because of {because:?}");
-    };
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    let text = text.unwrap_or_default();
-    assert!(
-        text.contains(because),
-        "it fails, but not because of {because:?}: {text}"
-    );
-    eprintln!("FAILS AS EXPECTED: {text}");
+/// All of a test's draws in the campaign (`TACTUS_ALL_SEEDS=1`, as `cargo xtask campaign tests` sets it), a few in the
+/// test command.
+pub fn count(all: u64, few: u64) -> u64 {
+    match std::env::var("TACTUS_ALL_SEEDS").as_deref() {
+        Ok("1") => all,
+        _ => few.min(all),
+    }
 }
 
-/// A table of properties for `tactus evaluate --properties`. Each set, "train" and "validate", has `trials` of a texture, a
-/// movement and a set. Textures lie 1 apart in each property, their trials up to a hundredth of their squares.
+/// The seeds of a test that draws from so many: five of them in the test command.
+pub fn seeds(all: u64) -> std::ops::RangeInclusive<u64> {
+    1..=count(all, 5)
+}
+
+/// A table of properties for `tactus evaluate --properties`. Each set, "train" and "validate", has `trials` of a
+/// texture, a movement and a set. Textures lie 1 apart in each property, their trials up to a hundredth of their
+/// squares.
 pub fn properties_csv(
     textures: i32,
     movements: i32,
@@ -82,27 +79,4 @@ pub fn properties_csv(
         }
     }
     csv
-}
-
-#[cfg(test)]
-mod tests {
-    use super::expected_to_fail;
-
-    #[test]
-    fn a_failure_that_is_known_passes() {
-        let newton = 3;
-        expected_to_fail("3 N", || assert!(newton < 2, "{newton} N"));
-    }
-
-    #[test]
-    #[should_panic(expected = "it passes now")]
-    fn a_mark_that_is_no_longer_true_fails() {
-        expected_to_fail("3 N", || ());
-    }
-
-    #[test]
-    #[should_panic(expected = "not because of")]
-    fn another_failure_than_the_known_one_fails() {
-        expected_to_fail("3 N", || panic!("no board"));
-    }
 }

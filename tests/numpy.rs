@@ -1,5 +1,5 @@
-//! The paper's exploration written for numpy (`oracle/evaluate.py`): without a fixed point or the core's kernels, for figures and
-//! for speed.
+//! The paper's exploration written for numpy (`oracle/evaluate.py`): without a fixed point or the core's kernels, for
+//! figures and for speed.
 use std::path::Path;
 use std::process::Command;
 

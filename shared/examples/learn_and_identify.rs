@@ -4,7 +4,7 @@
 
 use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Movement, Observation, Properties, PropertySet};
-use tactus_core::table::{Experience, Texture, encode};
+use tactus_core::table::{Experience, encode};
 
 /// Traction in N, roughness in ln counts^2 and fineness in ln Hz of some slides at one movement.
 const DENIM: [[f32; 3]; 3] = [[0.45, 6.7, 5.6], [0.43, 6.8, 5.5], [0.46, 6.6, 5.6]];
@@ -25,7 +25,7 @@ pub(crate) fn main() {
     let textures = ["denim", "burlap"]
         .iter()
         .zip(&learned)
-        .map(|(name, experience)| Texture { name, experience });
+        .map(|(name, known)| (*name, &known[..]));
 
     // the table: the same bytes in a file, in the firmware and in the probe's flash
     let mut bytes = [0; 512];

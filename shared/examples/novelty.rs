@@ -4,7 +4,7 @@
 
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{FeatureSet, Movement, Observation, PropertySet, Vector};
-use tactus_core::table::{Scatter, Whitened, encode_fused, whiten};
+use tactus_core::table::{Drift, Scatter, Whitened, encode_fused, whiten_drifting};
 
 /// Twelve band powers.
 const FEATURES: usize = 12;
@@ -31,15 +31,16 @@ pub(crate) fn main() {
     for slides in &trials {
         scatter.push(slides).expect("as many features");
     }
-    let whitenings = whiten(&[scatter]).expect("enough trials");
+    let learned = whiten_drifting(&[scatter], FeatureSet::Bands, Drift::NONE);
+    let (whitening, _) = learned.expect("enough trials").remove(0);
     let mut learned = [[Whitened::default()]; NAMES.len()];
     for ([mean], slides) in learned.iter_mut().zip(&trials) {
         for slide in slides {
-            mean.teach(&whitenings[0].apply(slide));
+            mean.teach(&whitening.apply(slide));
         }
     }
     let textures = NAMES.into_iter().zip(learned.iter().map(|mean| &mean[..]));
-    let movements = [(Movement::FOR_FINENESS, whitenings[0].clone())];
+    let movements = [(Movement::FOR_FINENESS, whitening)];
     let mut bytes = [0; 4096];
     let table = encode_fused(&mut bytes, FeatureSet::Bands, &movements, textures).expect("it fits");
 

@@ -10,7 +10,7 @@ use tactus_core::explorer::{Config, Explorer};
 use tactus_core::features::{Block, Movement, Properties, Property, PropertySet, Slide};
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::Rig;
-use tactus_core::table::{Experience, Texture, encode};
+use tactus_core::table::{Experience, encode};
 
 const MOVEMENT: Movement = Movement::FOR_FINENESS;
 
@@ -55,8 +55,7 @@ pub(crate) fn main() {
     let plan = Plan::new();
     let fine = learn(Hum(400.0), &plan);
     let coarse = learn(Hum(80.0), &plan);
-    let textures = [("fine", &fine), ("coarse", &coarse)];
-    let textures = textures.map(|(name, experience)| Texture { name, experience });
+    let textures = [("fine", &fine[..]), ("coarse", &coarse[..])];
     let (mut bytes, measured) = ([0; 512], PropertySet::ALL);
     let table = encode(&mut bytes, measured, &[MOVEMENT], textures.into_iter());
     let table = table.expect("it fits");

@@ -11,5 +11,5 @@ mod spectrum;
 pub use fir::BandPower;
 pub use kernels::{Kernels, Reals};
 pub use microfft::Complex32;
-pub use plan::{Angles, FRAME, Folded, HALVES, HalfFilters, PASS_BAND_HZ, Plan, TAPS, Taps};
-pub use spectrum::{BIN_HZ, BINS, FrameSum, HOP, Spectrum, SpectrumSum};
+pub use plan::{Angles, BAND_PASS, FRAME, Folded, HALVES, HalfFilters, Plan, TAPS, Taps};
+pub use spectrum::{BIN_HZ, BINS, HOP, Spectrum, SpectrumSum};

@@ -8,19 +8,19 @@
 //! | 2, 3 | 16 | settings: calibration, skin care, progress of the training, what the probe has learned by itself |
 //! | 4, 5 | 64, 128 | one texture table each that is longer than fits into 0 and 1, of 64 KB at most |
 //!
-//! Of all tables that are committed and whole the newest is in use. Among the two slots that a new one fits into it takes the
-//! place of the older one, so that the newest is never erased.
+//! Of all tables that are committed and whole the newest is in use. Among the two slots that a new one fits into it
+//! takes the place of the older one, so that the newest is never erased.
 //!
 //! A cut at any moment, in the middle of a word or of an erase as well, leaves the state before an operation or the one
 //! after it. So does a future that is dropped before its end; the store must then be opened anew.
 //!
 //! # Bits that change
 //!
-//! Everything has a checksum, and [`Store::mend`] looks at everything. It puts up to three wrong bits of a table's header right,
-//! and two of a record. A damaged table gives way to the one before it, and so does a damaged record:
-//! [`Store::damaged_table`] and [`Store::damaged_record`] tell. A record that the flash does not take is stored again behind
-//! the words that were in its way. The handheld, whose image has no room for it, does not mend its store: it tells of a damaged
-//! table, not of a damaged header or record.
+//! Everything has a checksum, and [`Store::mend`] looks at everything. It puts up to three wrong bits of a table's
+//! header right, and two of a record. A damaged table gives way to the one before it, and so does a damaged record:
+//! [`Store::damaged_table`] and [`Store::damaged_record`] tell. A record that the flash does not take is stored again
+//! behind the words that were in its way. The handheld, whose image has no room for it, does not mend its store: it
+//! tells of a damaged table, not of a damaged header or record.
 //!
 //! # A table slot, little-endian
 //!
@@ -45,7 +45,6 @@ mod correct;
 mod error;
 mod layout;
 mod mend;
-mod open;
 mod pages;
 mod records;
 mod sectors;

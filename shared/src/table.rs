@@ -66,7 +66,6 @@ mod gaussian;
 mod lengths;
 mod limits;
 mod matrix;
-mod one_section;
 mod patch;
 mod population;
 mod samples;
@@ -79,21 +78,21 @@ mod whitening;
 
 pub use drift::{Drift, Drifts, PAIRS};
 pub use encode::{
-    Change, EncodeError, Known, Texture, amend, encode, encode_fused, encoded_len, with_sections,
+    Change, EncodeError, TextureStats, amend, encode, encode_fused, encoded_len, with_sections,
 };
 pub use finger::{FINGER_LENGTH, with_finger};
 pub use format::{
     Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
-pub use lengths::{MAX_LENGTHS, Shorter, lengths_length, with_lengths};
+pub use lengths::{MAX_LENGTHS, Shorter, with_lengths};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
 pub use patch::{recentre, retell};
 pub use population::{POPULATION, Population};
-pub use samples::{samples_length, with_moved};
+pub use samples::with_moved;
 pub(crate) use scatter::oas;
-pub use scatter::{Scatter, WhitenError, whiten, whiten_drifting};
+pub use scatter::{Scatter, WhitenError, whiten_drifting};
 pub use sections::Sections;
 pub use slopes::{Pace, Slopes};
 pub(crate) use slopes::{SlopesView, moved};

@@ -1,8 +1,8 @@
 //! What host and probe say to each other: [`Request`]s to the probe, [`Report`]s from it.
 //!
-//! A frame is a message in postcard's format and the CRC-32 (ISO-HDLC, little-endian) of it, both in COBS, and a 0. A 0 is
-//! nowhere else, so that after any disturbance the next frame is understood again. A frame that is damaged, too long or no
-//! message is counted and dropped: see [`Receiver`].
+//! A frame is a message in postcard's format and the CRC-32 (ISO-HDLC, little-endian) of it, both in COBS, and a 0. A 0
+//! is nowhere else, so that after any disturbance the next frame is understood again. A frame that is damaged, too long
+//! or no message is counted and dropped: see [`Receiver`].
 
 pub mod bringup;
 mod command;

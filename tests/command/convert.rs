@@ -1,41 +1,19 @@
-//! `tactus convert`: what others' readers find in the files is what recordings and log hold.
+//! `tactus convert`: what others' readers find in the files is what the log holds.
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Read as _;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
-use flate2::read::GzDecoder;
 use mcap::MessageStream;
 use serde_json::Value;
-use tactus_core::features::Property;
-use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::measure_all;
 
-const RECORDINGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/simulated");
-
-fn tactus(arguments: &[&str]) -> Output {
-    let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    tactus.args(arguments).output().unwrap()
-}
-
-fn convert(from: &Path, kind: &str, to: &Path) {
-    let out = tactus(&["convert", text(from), kind, text(to), "--format", "json"]);
-    assert!(out.status.success(), "{out:?}");
-    let written: Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(written[0]["bytes"], fs::metadata(to).unwrap().len());
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
+use crate::{Scratch, array};
 
 /// Time and content of all messages of a file, by channel; each channel's schema names each field.
-fn messages(file: &Path) -> BTreeMap<String, Vec<(u64, Value)>> {
-    let bytes = fs::read(file).unwrap();
+fn messages(bytes: &[u8]) -> BTreeMap<String, Vec<(u64, Value)>> {
     let mut found: BTreeMap<String, Vec<(u64, Value)>> = BTreeMap::new();
-    for message in MessageStream::new(&bytes).unwrap() {
+    for message in MessageStream::new(bytes).unwrap() {
         let message = message.unwrap();
         let channel = &message.channel;
         let content: Value = serde_json::from_slice(&message.data).unwrap();
@@ -56,92 +34,19 @@ fn messages(file: &Path) -> BTreeMap<String, Vec<(u64, Value)>> {
     found
 }
 
-fn counts(messages: &[(u64, Value)], field: &str) -> Vec<i16> {
-    let numbers = messages.iter().map(|(_, content)| content[field].as_i64());
-    numbers.map(|number| number.unwrap() as i16).collect()
-}
-
-/// A session's log, unpacked.
-fn session(folder: &Path) -> (std::path::PathBuf, Vec<Value>) {
-    let packed = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/golden/identify.jsonl.gz"
-    );
-    let mut lines = String::new();
-    let mut packed = GzDecoder::new(fs::File::open(packed).unwrap());
-    packed.read_to_string(&mut lines).unwrap();
-    let log = folder.join("session.jsonl");
-    fs::write(&log, &lines).unwrap();
-    let lines = lines
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap());
-    (log, lines.collect())
-}
-
-#[test]
-fn an_mcap_of_recordings_holds_every_sample_and_feature() {
-    let temp = tempfile::tempdir().unwrap();
-    let file = temp.path().join("recordings.mcap");
-    convert(Path::new(RECORDINGS), "--mcap", &file);
-    let found = messages(&file);
-    let set = RecordingSet::open(Path::new(RECORDINGS)).unwrap();
-    let [mut pac, mut pdc, mut shear] = [const { Vec::new() }; 3];
-    let mut slides = 0;
-    for index in 0..set.textures().len() {
-        for slide in set.load_texture(index).unwrap() {
-            pac.extend(slide.still());
-            pac.extend(slide.pac());
-            pdc.extend(slide.pdc.clone());
-            shear.extend(slide.shear_mn().unwrap());
-            slides += 1;
-        }
-    }
-    assert_eq!(counts(&found["/pac"], "counts"), pac);
-    assert_eq!(counts(&found["/pdc"], "counts"), pdc);
-    assert_eq!(counts(&found["/shear"], "mn"), shear);
-    assert_eq!(found["/movement"].len(), slides);
-    // P_AC and P_DC begin with the movement, and each sample is 1/2200 s after the one before
-    let (begin, _) = found["/movement"][0];
-    assert_eq!(found["/pdc"][0].0, begin);
-    let still = set.load_texture(0).unwrap()[0].still().len();
-    assert_eq!(found["/pac"][still].0, begin);
-    assert_eq!(found["/pac"][still + 2200].0, begin + 1_000_000_000);
-    let measured = measure_all(&set, |_| ()).unwrap().concat();
-    assert_eq!(found["/features"].len(), measured.len());
-    for (slide, (_, told)) in measured.iter().zip(&found["/features"]) {
-        let [traction, roughness, fineness] =
-            Property::ALL.map(|p| slide.measurement.properties.get(p));
-        for (value, name) in [
-            (traction, "traction_n"),
-            (roughness, "roughness"),
-            (fineness, "fineness"),
-        ] {
-            assert_eq!(told[name].as_f64().map(|x| x as f32), value, "{name}");
-        }
-    }
-    read_by_python(&file, found.values().map(Vec::len).sum());
-}
-
 #[test]
 fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
-    let temp = tempfile::tempdir().unwrap();
-    let (log, lines) = session(temp.path());
-    let file = temp.path().join("session.mcap");
-    convert(&log, "--mcap", &file);
-    let found = messages(&file);
-    let events: Vec<(u64, &Value)> = lines
-        .iter()
-        .filter_map(|line| {
-            Some((
-                line.get("report")?["at_ms"].as_u64()?,
-                &line["report"]["event"],
-            ))
-        })
+    let at = Scratch::new();
+    let log = at.log("identify");
+    at.printed("convert identify.jsonl --mcap file");
+    let found = messages(&at.read("file"));
+    let lines: Vec<Value> = log
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
         .collect();
     let of = |kind: &str| -> Vec<(u64, &Value)> {
-        let of_kind = events
-            .iter()
-            .filter_map(|(at, e)| Some((*at, e.get(kind)?)));
+        let reports = lines.iter().filter_map(|line| line.get("report"));
+        let of_kind = reports.filter_map(|r| Some((r["at_ms"].as_u64()?, r["event"].get(kind)?)));
         of_kind.collect()
     };
     let live = of("Live");
@@ -152,23 +57,17 @@ fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
         assert_eq!(rig["force_mn"], told["force_mn"]);
         assert_eq!(rig["stage_mm"], told["stage_um"].as_f64().unwrap() * 1e-3);
     }
-    let sent: Vec<Value> = of("Block")
-        .iter()
-        .flat_map(|(_, block)| block["pac"].as_array().unwrap().clone())
-        .collect();
-    let pac: Vec<Value> = found["/pac"]
-        .iter()
-        .map(|(_, m)| m["counts"].clone())
-        .collect();
-    assert_eq!(pac, sent);
+    let blocks = of("Block");
+    let sent = blocks.iter().flat_map(|(_, block)| array(&block["pac"]));
+    assert!(found["/pac"].iter().map(|(_, m)| &m["counts"]).eq(sent));
     // gap-free, but for where the still finger's samples end
     let steps = found["/pac"].windows(2).map(|pair| pair[1].0 - pair[0].0);
     let gaps = steps.filter(|step| !(454_000..=455_000).contains(step));
     assert!(gaps.count() <= 1);
-    let [(at, verdict)] = of("Verdict")[..] else {
+    let [(when, verdict)] = of("Verdict")[..] else {
         panic!()
     };
-    assert_eq!(found["/verdict"][0].0, at * 1_000_000);
+    assert_eq!(found["/verdict"][0].0, when * 1_000_000);
     assert_eq!(found["/verdict"][0].1["name"], verdict["name"]);
     // the table was read in this session: textures have their names
     let (_, last) = found["/posterior"].last().unwrap();
@@ -179,73 +78,36 @@ fn an_mcap_of_a_log_holds_what_the_probe_said_when_it_said_it() {
     );
     let asked = lines.iter().filter(|line| line.get("command").is_some());
     assert_eq!(found["/request"].len(), asked.count());
+    read_by_python(&at.path("file"), found.values().map(Vec::len).sum());
 }
 
 #[test]
-fn files_go_through_pipes() {
-    let temp = tempfile::tempdir().unwrap();
-    let (log, _) = session(temp.path());
-    let file = temp.path().join("session.mcap");
-    convert(&log, "--mcap", &file);
-    let piped = Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .args(["convert", "-", "--mcap", "-"])
-        .stdin(fs::File::open(&log).unwrap())
-        .output()
-        .unwrap();
-    assert!(piped.status.success(), "{piped:?}");
-    // but for the name of where it is from, the same file
-    let of = |bytes: &[u8]| {
-        let messages = MessageStream::new(bytes).unwrap().map(Result::unwrap);
-        messages
-            .map(|m| (m.log_time, m.data.to_vec()))
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(of(&piped.stdout), of(&fs::read(&file).unwrap()));
-}
-
-#[test]
-fn what_cannot_be_converted_is_told() {
-    let temp = tempfile::tempdir().unwrap();
-    let to = temp.path().join("there");
-    fs::write(&to, "mine").unwrap();
-    let over = tactus(&["convert", RECORDINGS, "--mcap", text(&to)]);
-    assert_eq!(over.status.code(), Some(1));
-    assert_eq!(fs::read(&to).unwrap(), b"mine");
-    let nothing = tactus(&["convert", RECORDINGS]);
-    assert_eq!(nothing.status.code(), Some(2));
-}
-
-#[test]
-fn layouts_show_channels_that_there_are() {
-    let temp = tempfile::tempdir().unwrap();
-    let (log, _) = session(temp.path());
-    let file = temp.path().join("session.mcap");
-    convert(&log, "--mcap", &file);
-    let bytes = fs::read(&file).unwrap();
+fn a_file_is_not_written_over_and_layouts_show_channels_that_there_are() {
+    let at = Scratch::new();
+    at.log("identify");
+    at.printed("convert identify.jsonl --mcap file");
+    let bytes = at.read("file");
+    at.error("convert identify.jsonl --mcap file", 1);
+    assert!(at.read("file") == bytes);
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    let mut fields = Vec::new();
-    for channel in summary.channels.values() {
-        let schema = channel.schema.as_ref().unwrap();
-        let schema: Value = serde_json::from_slice(&schema.data).unwrap();
-        fields.push(channel.topic.clone());
-        let names = schema["properties"].as_object().unwrap().keys();
-        fields.extend(names.map(|name| format!("{}/{name}", channel.topic)));
-    }
     let docs = |name| format!("{}/../../docs/{name}", env!("CARGO_MANIFEST_DIR"));
     let page = fs::read_to_string(docs("src/convert.md")).unwrap();
+    let mut fields = Vec::new();
     for channel in summary.channels.values() {
-        assert!(page.contains(&format!("| `{}` |", channel.topic)));
+        let topic = &channel.topic;
+        assert!(page.contains(&format!("| `{topic}` |")), "{topic}");
+        let schema = channel.schema.as_ref().unwrap();
+        let schema: Value = serde_json::from_slice(&schema.data).unwrap();
+        fields.push(topic.clone());
+        let names = schema["properties"].as_object().unwrap().keys();
+        fields.extend(names.map(|name| format!("{topic}/{name}")));
     }
-    let foxglove = fs::read_to_string(docs("foxglove.json")).unwrap();
-    serde_json::from_str::<Value>(&foxglove).unwrap();
-    let plotjuggler = fs::read_to_string(docs("plotjuggler.xml")).unwrap();
-    roxmltree::Document::parse(&plotjuggler).unwrap();
-    for layout in [foxglove, plotjuggler] {
-        let shown: Vec<String> = layout
+    for layout in ["foxglove.json", "plotjuggler.xml"] {
+        let layout = fs::read_to_string(docs(layout)).unwrap();
+        let words = layout
             .split('"')
-            .filter(|word| word.starts_with('/') && !word.contains('\n'))
-            .map(|word| word.replace('.', "/"))
-            .collect();
+            .filter(|word| word.starts_with('/') && !word.contains('\n'));
+        let shown: Vec<String> = words.map(|word| word.replace('.', "/")).collect();
         assert!(shown.len() >= 5);
         for field in shown {
             assert!(fields.contains(&field), "{field}");
@@ -253,40 +115,27 @@ fn layouts_show_channels_that_there_are() {
     }
 }
 
-/// The reader that Foxglove publishes finds as many messages.
+/// The reader that Foxglove publishes finds as many messages; skipped where it is not installed.
 fn read_by_python(file: &Path, messages: usize) {
-    python(
-        "import sys, json
+    const PROGRAM: &str = "import sys, json
 from mcap.reader import make_reader
 n = 0
 for schema, channel, message in make_reader(open(sys.argv[1], 'rb')).iter_messages():
     json.loads(message.data)
     assert channel.message_encoding == 'json' and schema.encoding == 'jsonschema'
     n += 1
-assert n == int(sys.argv[2]), n",
-        &[text(file), &messages.to_string()],
-        "mcap",
-    );
-}
-
-/// Runs a program of Python that needs a package; skipped where there is none.
-fn python(program: &str, arguments: &[&str], package: &str) {
-    let python = || Command::new("python3");
-    let has = python().args(["-c", &format!("import {package}")]).output();
-    if !has.is_ok_and(|has| has.status.success()) {
-        tactus_tests::skipped(&format!(
-            "no python3 with {package} (pip install {package})"
-        ));
-        return;
+assert n == int(sys.argv[2]), n";
+    let python = |program| {
+        let mut python = Command::new("python3");
+        python
+            .args(["-c", program])
+            .arg(file)
+            .arg(messages.to_string())
+            .output()
+    };
+    if !python("import mcap").is_ok_and(|has| has.status.success()) {
+        return tactus_tests::skipped("no python3 with mcap (pip install mcap)");
     }
-    let ran = python()
-        .args(["-c", program])
-        .args(arguments)
-        .output()
-        .unwrap();
-    assert!(
-        ran.status.success(),
-        "{}",
-        String::from_utf8_lossy(&ran.stderr)
-    );
+    let ran = python(PROGRAM).unwrap();
+    assert!(ran.status.success(), "{ran:?}");
 }

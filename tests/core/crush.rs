@@ -5,17 +5,18 @@ use tactus_core::features::Movement;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Fault, Phase};
 use tactus_lab::sim::rig::SimRig;
+use tactus_tests::seeds;
 use tactus_world::faults::Fault as Cause;
 use tactus_world::mount::Mount;
 use tactus_world::world::Setup;
 
+use crate::rigs::{assert_all, homed, setup, start, texture, wait};
+
 /// A rig that nobody has calibrated, its DIR inverted from power-up on, over one of the samples.
 fn inverted(seed: u64) -> SimRig {
     let mut rig = SimRig::new(Setup {
-        texture: 1 + (seed * 37 % 117) as u8,
-        trial_seed: seed,
         finger_seed: seed,
-        ..Setup::default()
+        ..setup(texture(seed), seed)
     });
     rig.world().inject(Cause::LeverDirInverted);
     rig
@@ -30,61 +31,51 @@ fn homed_again_and_again(rig: &mut SimRig, times: u32) -> f64 {
     rig.world().truth().force_max_n
 }
 
-/// Up is down. The first homing presses until the guard sees it; the zero that it began with must not be forgotten then.
+/// Up is down. The first homing presses until the guard sees it; the zero that it began with must not be forgotten
+/// then.
 #[test]
 fn a_homing_that_goes_down_adds_no_force_to_the_last_one() {
-    let objections: Vec<String> = (0..24)
-        .into_par_iter()
-        .filter_map(|seed| {
-            let mut rig = inverted(seed);
-            let once_n = homed_again_and_again(&mut rig, 1);
-            let often_n = homed_again_and_again(&mut rig, 7);
-            let fails = once_n > 2.2 || often_n > once_n + 1e-3;
-            fails.then(|| format!("{seed}: {once_n:.2} N, {often_n:.2} N after eight homings"))
-        })
-        .collect();
-    assert!(objections.is_empty(), "{}", objections.join("\n"));
+    assert_all(seeds(50).collect(), |&seed| {
+        let mut rig = inverted(seed);
+        let once_n = homed_again_and_again(&mut rig, 1);
+        let often_n = homed_again_and_again(&mut rig, 7);
+        let is_right = once_n <= 2.2 && often_n <= once_n + 1e-3;
+        let said = format!("{seed}: {once_n:.2} N, {often_n:.2} N after eight homings");
+        if is_right { Ok(()) } else { Err(said) }
+    });
 }
 
 /// DIR turns round while the finger presses, and then it is to be lifted.
 #[test]
 fn a_lift_that_goes_down_is_given_up_in_time() {
-    let objections: Vec<String> = (0..200)
-        .into_par_iter()
-        .filter_map(|seed| {
-            let mut rig = SimRig::new(Setup {
-                texture: 1 + (seed * 37 % 117) as u8,
-                trial_seed: seed,
-                ..Setup::default()
-            });
-            rig.home().unwrap();
-            rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
-            while rig.control().phase() != Phase::Sliding {
-                rig.tick();
-            }
-            rig.world().inject(Cause::LeverDirInverted);
-            rig.control().stop();
-            let _ = rig.rest(|_| ());
-            let lifted_n = rig.world().truth().force_max_n;
-            let often_n = homed_again_and_again(&mut rig, 7);
-            (often_n > 2.2)
-                .then(|| format!("{seed}: {lifted_n:.2} N, then {often_n:.2} N by lifting"))
-        })
-        .collect();
-    assert!(objections.is_empty(), "{}", objections.join("\n"));
+    assert_all(seeds(200).collect(), |&seed| {
+        let mut rig = homed(sample(seed), Unguarded::default());
+        start(&mut rig, Movement::FOR_TRACTION, Phase::Sliding);
+        rig.world().inject(Cause::LeverDirInverted);
+        rig.control().stop();
+        let _ = rig.rest(|_| ());
+        let lifted_n = rig.world().truth().force_max_n;
+        let often_n = homed_again_and_again(&mut rig, 7);
+        let said = format!("{seed}: {lifted_n:.2} N, then {often_n:.2} N by lifting");
+        if often_n <= 2.2 { Ok(()) } else { Err(said) }
+    });
 }
 
-/// DIR turns round while the finger hangs over its sample: when it goes up to its switch, to wait there, it comes down. P_DC sees
-/// it; where that is dead, too, the spring of the mount holds it.
+fn sample(seed: u64) -> Setup {
+    Setup {
+        texture: texture(seed),
+        trial_seed: seed,
+        ..Setup::default()
+    }
+}
+
+/// DIR turns round while the finger hangs over its sample: when it goes up to its switch, to wait there, it comes down.
+/// P_DC sees it; where that is dead, too, the spring of the mount holds it.
 #[test]
 fn a_finger_that_is_parked_downwards_is_given_up_in_time() {
     for (dead, limits_n) in [(false, 0.05..0.5), (true, 0.0..2.2)] {
         let parked = |seed: u64| {
-            let mut rig = SimRig::new(Setup {
-                texture: 1 + (seed * 37 % 117) as u8,
-                trial_seed: seed,
-                ..Setup::default()
-            });
+            let mut rig = SimRig::new(sample(seed));
             rig.world().mount(Mount::SPRUNG);
             rig.home().unwrap();
             rig.slide(Movement::FOR_ROUGHNESS, 0.5, |_, _| ()).unwrap();
@@ -93,16 +84,15 @@ fn a_finger_that_is_parked_downwards_is_given_up_in_time() {
                 rig.world().inject(Cause::PdcStuck);
             }
             rig.world().reset_extremes();
-            for _ in 0..15_000 {
-                rig.tick();
-            }
+            wait(&mut rig, 15_000);
             let Phase::Faulted(fault) = rig.control().phase() else {
                 panic!("{seed}: {:?}", rig.control().phase());
             };
             assert!(fault.recovery().contains("knob"), "{seed}: {fault}");
             homed_again_and_again(&mut rig, 7)
         };
-        let forces: Vec<f64> = (0..50).into_par_iter().map(parked).collect();
+        let seeds: Vec<u64> = seeds(50).collect();
+        let forces: Vec<f64> = seeds.into_par_iter().map(parked).collect();
         let most_n = forces.into_iter().fold(0.0, f64::max);
         println!("at most {most_n:.2} N, P_DC dead: {dead}");
         assert!(limits_n.contains(&most_n), "{most_n} N, P_DC dead: {dead}");
@@ -118,9 +108,7 @@ fn who_has_to_turn_the_knob_is_told_of_it() {
     let Phase::Faulted(fault) = rig.control().phase() else {
         panic!("{:?}", rig.control().phase());
     };
-    for _ in 0..60_000 {
-        rig.tick();
-    }
+    wait(&mut rig, 60_000);
     let pressed_n = rig.world().truth().force_n;
     assert!(pressed_n > 0.05, "nobody has lifted it: {pressed_n} N");
     for fault in [fault, Fault::ForceHigh, Fault::LeverNotHome] {
@@ -156,14 +144,11 @@ fn a_disturbance_of_the_stops_wire_ends_no_slide() {
 #[test]
 fn a_stop_needs_no_program() {
     for (seed, running) in [(1, Phase::Pressing), (2, Phase::Sliding)] {
-        let mut rig = SimRig::unguarded(
-            Setup {
-                trial_seed: seed,
-                ..Setup::default()
-            },
-            Unguarded::against(Fault::EStop),
-        );
-        rig.home().unwrap();
+        let setup = Setup {
+            trial_seed: seed,
+            ..Setup::default()
+        };
+        let mut rig = homed(setup, Unguarded::against(Fault::EStop));
         rig.control().start(Movement::FOR_TRACTION, 0.3).unwrap();
         while rig.control().phase() != running || rig.world().truth().force_n < 0.2 {
             rig.tick();
@@ -171,9 +156,7 @@ fn a_stop_needs_no_program() {
         let before = rig.world().truth();
         rig.world().inject(Cause::EStop);
         rig.world().reset_extremes();
-        for _ in 0..3_000 {
-            rig.tick();
-        }
+        wait(&mut rig, 3_000);
         let after = rig.world().truth();
         assert_eq!(after.tip_mm, before.tip_mm, "{running:?}");
         assert_eq!(after.speed_mm_s, 0.0, "{running:?}");

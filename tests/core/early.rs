@@ -9,6 +9,7 @@ use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, PropertySet};
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault, Phase};
 use tactus_core::table::{MAX_TEXTURES, Table};
 use tactus_core::wire::{Command, Event, Identify};
@@ -17,48 +18,33 @@ use tactus_lab::sim::flash::{RamFlash, TABLE};
 use tactus_lab::sim::probe::{Host, switch_on};
 use tactus_lab::sim::rig::{SimError, SimRig};
 use tactus_link::follow::Follower;
+use tactus_tests::seeds;
 use tactus_world::faults::Fault as Cause;
 use tactus_world::world::Setup;
 
-/// What explorations came to, in sum.
+use crate::rigs::{assert_all, homed, setup, start, texture, wait};
+
+/// Sliding and the rig's time, s; right and wrong when sure; slides that ended early; the largest force, N.
 #[derive(Clone, Copy, Default, Debug)]
 struct Sums {
-    explorations: f64,
     sliding_s: f64,
     rig_s: f64,
     right: f64,
-    sure: f64,
-    wrong_when_sure: f64,
-    early: f64,
+    wrong: f64,
+    early: usize,
     most_n: f64,
 }
 
 impl Sums {
     fn and(self, other: Self) -> Self {
         Self {
-            explorations: self.explorations + other.explorations,
             sliding_s: self.sliding_s + other.sliding_s,
             rig_s: self.rig_s + other.rig_s,
             right: self.right + other.right,
-            sure: self.sure + other.sure,
-            wrong_when_sure: self.wrong_when_sure + other.wrong_when_sure,
+            wrong: self.wrong + other.wrong,
             early: self.early + other.early,
             most_n: self.most_n.max(other.most_n),
         }
-    }
-
-    fn show(&self, name: &str) {
-        let n = self.explorations;
-        println!(
-            "{name}: {n} explorations, {:.2} s of sliding and {:.1} s of the rig's time a verdict, right {:.2} %, {} of {} sure are wrong; {} ended early; at most {:.2} N",
-            self.sliding_s / n,
-            self.rig_s / n,
-            100.0 * self.right / n,
-            self.wrong_when_sure,
-            self.sure,
-            self.early,
-            self.most_n
-        );
     }
 }
 
@@ -76,20 +62,13 @@ fn explored(
     let mut rig = SimRig::new(world.setup(texture, trial));
     rig.control().calibrate(calibration).unwrap();
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, PropertySet::ALL, config).unwrap();
-    let mut early = Vec::new();
-    let mut slides = 0;
-    let verdict = block_on(explore(
-        &mut rig,
-        &mut explorer,
-        &Plan::new(),
-        || 0,
-        |step| match step {
-            ExplorationStep::Early(ms) => early.push((slides, ms)),
-            ExplorationStep::Measured(..) => slides += 1,
-            _ => {}
-        },
-    ));
-    let verdict = verdict.unwrap();
+    let (mut early, mut slides) = (Vec::new(), 0);
+    let tell = |step: ExplorationStep<'_, SimError>| match step {
+        ExplorationStep::Early(ms) => early.push((slides, ms)),
+        ExplorationStep::Measured(..) => slides += 1,
+        _ => {}
+    };
+    let verdict = block_on(explore(&mut rig, &mut explorer, &Plan::new(), || 0, tell)).unwrap();
     // the last one is the only one that ends early, and it did end then: block and look take less than 0.1 s
     assert!(early.len() <= 1);
     if let Some(&(slide, ms)) = early.first() {
@@ -106,74 +85,64 @@ fn explored(
     let flag = |is: bool| f64::from(u8::from(is));
     let performed = rig.performed();
     Sums {
-        explorations: 1.0,
         sliding_s: performed.iter().map(|p| p.steady_s).sum(),
         rig_s: rig.now().as_secs_f64(),
         right: flag(verdict.sure && right),
-        sure: flag(verdict.sure),
-        wrong_when_sure: flag(verdict.sure && !right),
-        early: early.len() as f64,
+        wrong: flag(verdict.sure && !right),
+        early: early.len(),
         most_n: performed.iter().map(|p| p.force_max_n).fold(0.0, f64::max),
     }
 }
 
-/// `EARLY_TEXTURES=20 EARLY_TRIALS=5 EARLY_EACH=20 cargo test --release -p tactus-tests --test early -- --nocapture` is the long one.
+/// Four explorations in a world, by slides to their end and by slides that may end early.
+fn in_a_world(seed: u64) -> [Sums; 2] {
+    let world = Collection {
+        seed,
+        textures: Collection::spread(texture(seed), 8),
+        trials: 4,
+    };
+    let calibration = calibrated(world.setup(world.textures[0], 0)).unwrap();
+    let early = world.learn_lengths(Method::Fused, calibration, &[500, 1000, 2000], || ());
+    let early = early.unwrap();
+    let early = Table::read(&early).unwrap();
+    // the same without lengths
+    let whole = tactus_lab::eval::learn::know_lengths(early.as_bytes(), &[]).unwrap();
+    let whole = Table::read(&whole).unwrap();
+    let presented = |n: u64| {
+        let at = (seed + n) as usize * 7 % world.textures.len();
+        (world.textures[at], 100 + n)
+    };
+    [whole, early].map(|table| {
+        let all = (0..4).map(|n| explored(&world, calibration, table, presented(n)));
+        all.fold(Sums::default(), Sums::and)
+    })
+}
+
 #[test]
 fn a_rig_slides_less_and_is_as_right() {
-    let of = |name, usual| std::env::var(name).map_or(usual, |n| n.parse::<u32>().unwrap());
-    let textures = of("EARLY_TEXTURES", 8);
-    let (trials, each) = (of("EARLY_TRIALS", 4), of("EARLY_EACH", 4));
-    let sums: Vec<[Sums; 2]> = (1..=u64::from(of("EARLY_SEEDS", 50)))
-        .into_par_iter()
-        .map(|seed| {
-            let world = Collection {
-                seed,
-                textures: Collection::spread(1 + (seed * 37 % 117) as u8, textures as u8),
-                trials,
-            };
-            let calibration = calibrated(world.setup(world.textures[0], 0)).unwrap();
-            let learn = |lengths_ms: &[u16]| {
-                world
-                    .learn_lengths(Method::Fused, calibration, lengths_ms, || ())
-                    .unwrap()
-            };
-            let early = learn(&[500, 1000, 2000]);
-            let early = Table::read(&early).unwrap();
-            // the same without lengths
-            let whole = tactus_lab::eval::learn::know_lengths(early.as_bytes(), &[]).unwrap();
-            let whole = Table::read(&whole).unwrap();
-            let mut sums = [Sums::default(); 2];
-            for n in 0..u64::from(each) {
-                let at = (seed + n) as usize * 7 % world.textures.len();
-                let presented = (world.textures[at], 100 + n);
-                for (sums, table) in sums.iter_mut().zip([whole, early]) {
-                    *sums = sums.and(explored(&world, calibration, table, presented));
-                }
-            }
-            sums
-        })
-        .collect();
-    let [before, after] =
-        [0, 1].map(|n| sums.iter().map(|of| of[n]).fold(Sums::default(), Sums::and));
-    before.show("slides to their end");
-    after.show("slides that may end early");
-    assert_eq!(before.early, 0.0);
+    let worlds: Vec<u64> = seeds(50).collect();
+    let sums: Vec<[Sums; 2]> = worlds.into_par_iter().map(in_a_world).collect();
+    let sum = |n: usize| sums.iter().map(|of| of[n]).fold(Sums::default(), Sums::and);
+    let [before, after] = [sum(0), sum(1)];
+    println!(
+        "{} explorations: {before:?}, early {after:?}",
+        4 * sums.len()
+    );
+    assert!(before.early == 0 && after.early > 0);
     assert!(after.sliding_s < before.sliding_s);
     assert!(after.rig_s < before.rig_s);
     assert!(after.most_n < 2.2);
-    // both ways see the same slides up to the one that ends early: what differs, differs by three standard errors at most
-    let differs = |of: fn(&Sums) -> f64| {
+    // both ways see the same slides up to the one that ends early: what differs, differs by three standard errors at
+    // most
+    let worse = |of: fn(&Sums) -> f64| {
         let each: Vec<f64> = sums.iter().map(|[b, a]| of(a) - of(b)).collect();
         let mean = each.iter().sum::<f64>() / each.len() as f64;
         let squares: f64 = each.iter().map(|d| (d - mean).powi(2)).sum();
         let error = (squares / (each.len() as f64 - 1.0) / each.len() as f64).sqrt();
-        println!("by world {mean:+.3} +- {error:.3}");
-        (mean, error)
+        mean - 3.0 * error
     };
-    let (right, error) = differs(|s| s.right);
-    assert!(right >= -3.0 * error, "less right");
-    let (wrong, error) = differs(|s| s.wrong_when_sure);
-    assert!(wrong <= 3.0 * error, "more wrong when sure");
+    assert!(worse(|s| -s.right) <= 0.0, "less right");
+    assert!(worse(|s| s.wrong) <= 0.0, "more wrong when sure");
 }
 
 /// What a host hears that wants all samples.
@@ -270,44 +239,28 @@ fn guards_watch_while_a_slide_is_ended() {
         // the lift may come before the force is high
         (Cause::LeverRunaway, None),
     ];
-    for seed in 1..=50u64 {
-        for (cause, fault) in causes {
-            let setup = Setup {
-                texture: (seed * 37 % 117) as u8 + 1,
-                world_seed: seed,
-                trial_seed: seed,
-                finger_seed: seed,
-                ..Setup::default()
-            };
-            let mut rig = SimRig::new(setup);
-            rig.home().unwrap();
-            // 63 mm/s: the longest brake, 63 ms
-            rig.control().start(Movement::FOR_ROUGHNESS, 0.3).unwrap();
-            while rig.control().phase() != Phase::Sliding {
-                rig.tick();
-            }
-            for _ in 0..400 + seed * 3 {
-                rig.tick();
-            }
-            rig.control().end_slide();
-            for _ in 0..seed % 20 {
-                rig.tick();
-            }
-            assert_eq!(rig.control().phase(), Phase::Sliding);
-            rig.world().inject(cause);
-            let ended = rig.rest(|_| ());
-            if let Some(fault) = fault {
-                assert_eq!(ended, Err(SimError::Fault(fault)), "seed {seed}");
-            }
-            let truth = rig.world().truth();
-            assert!(truth.force_max_n < 2.2, "{cause:?}, seed {seed}: {truth:?}");
-            assert!(
-                truth.speed_mm_s.abs() < 0.5,
-                "{cause:?}, seed {seed}: {truth:?}"
-            );
-            // an emergency stop takes the lever's supply
-            let lifted = truth.force_n == 0.0 || cause == Cause::EStop;
-            assert!(lifted, "{cause:?}, seed {seed}: {truth:?}");
-        }
-    }
+    let runs = seeds(50).flat_map(|seed| causes.map(|(cause, fault)| (seed, cause, fault)));
+    assert_all(runs.collect(), |&(seed, cause, fault)| {
+        let drawn = Setup {
+            world_seed: seed,
+            ..setup(texture(seed), seed)
+        };
+        let mut rig = homed(drawn, Unguarded::default());
+        // 63 mm/s: the longest brake, 63 ms
+        start(&mut rig, Movement::FOR_ROUGHNESS, Phase::Sliding);
+        wait(&mut rig, 400 + seed * 3);
+        rig.control().end_slide();
+        wait(&mut rig, seed % 20);
+        assert_eq!(rig.control().phase(), Phase::Sliding);
+        rig.world().inject(cause);
+        let ended = rig.rest(|_| ());
+        let is_named = fault.is_none_or(|fault| ended == Err(SimError::Fault(fault)));
+        let truth = rig.world().truth();
+        // an emergency stop takes the lever's supply
+        let is_lifted = truth.force_n == 0.0 || cause == Cause::EStop;
+        let stands = truth.speed_mm_s.abs() < 0.5;
+        let is_right = is_named && is_lifted && stands && truth.force_max_n < 2.2;
+        let said = format!("{cause:?}, seed {seed}: {ended:?}, {truth:?}");
+        if is_right { Ok(()) } else { Err(said) }
+    });
 }

@@ -3,7 +3,7 @@
 #[path = "oracle/verdicts.rs"]
 mod verdicts;
 
-use verdicts::{Drift, Judge, Told};
+use verdicts::{Drift, Judge, VerdictKind};
 
 use crate::oracle;
 
@@ -32,7 +32,7 @@ impl Random {
 /// A table that the product learns has the limits of the recipe, as far as draws go, and tells the same.
 #[test]
 fn a_learned_table_is_calibrated_as_the_recipe_says() {
-    use tactus_core::explorer::{Config, Explorer, Method, Told as Product};
+    use tactus_core::explorer::{Config, Explorer, Method, VerdictKind as Product};
     use tactus_core::features::{Movement, Observation, Properties, PropertySet};
     use tactus_core::table::Table;
     let (textures, d) = (19, 13);
@@ -100,19 +100,85 @@ fn a_learned_table_is_calibrated_as_the_recipe_says() {
             }
             let (told, best) = judge.tell(&mean, k, 0.01);
             let here = explorer.best();
-            let kind = match here.told() {
-                Product::New => Told::New,
-                Product::Changed => Told::Changed,
-                Product::Sure => Told::Sure,
-                Product::Undecided => Told::Undecided,
+            let kind = match here.kind() {
+                Product::New => VerdictKind::New,
+                Product::Changed => VerdictKind::Changed,
+                Product::Sure => VerdictKind::Sure,
+                Product::Undecided => VerdictKind::Undecided,
             };
             kinds[kind as usize] += 1;
             all += 1;
-            let named = matches!(told, Told::New) || usize::from(here.texture) == best;
+            let named = matches!(told, VerdictKind::New) || usize::from(here.texture) == best;
             same += usize::from(kind == told && named);
         }
     }
     println!("{same} of {all} told alike, {kinds:?}");
     assert!(same as f64 >= 0.95 * all as f64, "{same} of {all}");
     assert!(kinds[..3].iter().all(|count| *count > 100), "{kinds:?}");
+}
+
+/// Canonical variates are the recipe's whitened features, turned: all distances are the same.
+#[test]
+fn slides_are_whitened_by_the_recipe() {
+    use tactus_core::features::{FeatureSet, Vector};
+    use tactus_core::table::{Drift, Scatter, whiten_drifting};
+    for (seed, (textures, movements, d, each)) in (1..).zip([
+        (20, 3, 13, 5),
+        (117, 3, 14, 5),
+        (3, 1, 13, 2),
+        (1, 2, 13, 2),
+        (5, 4, 3, 4),
+        (6, 2, 1, 3),
+        (10, 36, 5, 15),
+    ]) {
+        let mut random = Random::new(seed, 0);
+        let mut normals = |n: usize, sd: f64| -> Vec<f64> {
+            (0..n).map(|_| sd * verdicts::normal(&mut random)).collect()
+        };
+        // neighbours scatter together, not the same at every movement
+        let mixing: Vec<Vec<f64>> = (0..movements).map(|_| normals(d, 0.4)).collect();
+        let mut slide = |movement: usize, mean: &[f64]| -> Vec<f64> {
+            let own = normals(d, 0.3);
+            let of = |i: usize| mean[i] + own[i] + mixing[movement][i] * own[i.saturating_sub(1)];
+            (0..d).map(|i| (of(i) * 1024.0).round() / 1024.0).collect()
+        };
+        let mut slides: oracle::Training = Vec::new();
+        for texture in 0..textures {
+            let mean: Vec<f64> = (0..d)
+                .map(|i| ((texture * 7 + i * 3) % 11) as f64 / 4.0)
+                .collect();
+            let of = |m| -> Vec<Vec<f64>> { (0..each).map(|_| slide(m, &mean)).collect() };
+            slides.push((0..movements).map(of).collect());
+        }
+        let trained = oracle::Trained::train(&slides);
+        let steps = |x: &Vec<f64>| -> Vector { x.iter().map(|x| (x * 1024.0) as i16).collect() };
+        let mut scatters = vec![Scatter::new(d); movements];
+        for row in &slides {
+            for (scatter, slides) in scatters.iter_mut().zip(row) {
+                let slides: Vec<Vector> = slides.iter().map(steps).collect();
+                scatter.push(&slides).unwrap();
+            }
+        }
+        let learned = whiten_drifting(&scatters, FeatureSet::Bands, Drift::NONE).unwrap();
+        assert_eq!(learned.len(), movements);
+        for (m, ((whitening, _), recipe)) in learned.iter().zip(&trained.movements).enumerate() {
+            let of_movement: Vec<_> = slides.iter().flat_map(|row| &row[m]).collect();
+            for pair in of_movement.windows(2) {
+                let [z, other] = [pair[0], pair[1]].map(|x| whitening.apply(&steps(x)));
+                let apart = z
+                    .iter()
+                    .zip(&other)
+                    .map(|(a, b)| f64::from(*a) - f64::from(*b));
+                let found = apart.map(|z| z * z).sum::<f64>().sqrt();
+                let [z, other] = [pair[0], pair[1]].map(|x| recipe.z(x));
+                let apart = z.iter().zip(&other).map(|(a, b)| 256.0 * (a - b));
+                let distance = apart.map(|z| z * z).sum::<f64>().sqrt();
+                let bound = 2.0 * (d as f64).sqrt() + 1e-3 * distance;
+                assert!(
+                    (found - distance).abs() <= bound,
+                    "{seed}: {found} {distance}"
+                );
+            }
+        }
+    }
 }

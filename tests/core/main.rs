@@ -1,7 +1,6 @@
 //! Tests of core and lab across the crates: golden values, reference figures, faults, explorations.
 
 mod arm;
-mod confusions;
 mod crush;
 mod early;
 mod fabricslide;
@@ -17,9 +16,10 @@ mod oracle;
 mod pace;
 mod page;
 mod played;
+mod press;
 mod presses;
 mod recordings;
 mod refresh;
+mod rigs;
 mod same;
 mod simulated_rig;
-mod training;

@@ -1,4 +1,5 @@
-//! Hands that do not hold their speed, with a sensor of it, without one, and with one that has lost track, in the simulated world.
+//! Hands that do not hold their speed, with a sensor of it, without one, and with one that has lost track, in the
+//! simulated world.
 
 use rayon::prelude::*;
 use tactus_core::explorer::Method;
@@ -8,6 +9,7 @@ use tactus_core::table::Table;
 use tactus_lab::eval::learn;
 use tactus_lab::sim::collection::Collection;
 use tactus_lab::sim::handheld::slides;
+use tactus_tests::count;
 use tactus_world::person::Manner;
 
 /// Slides of each texture that a table is learned from, as the factory's.
@@ -15,8 +17,8 @@ const TRIALS: usize = 15;
 /// Explorations of each texture.
 const EXPLORED: usize = 2;
 
-/// A hand with these deviations of ln(pace) and ln(force) from slide to slide, and a sensor of motion, which 1.25 mm of height put off by
-/// 5 %.
+/// A hand with these deviations of ln(pace) and ln(force) from slide to slide, and a sensor of motion, which 1.25 mm of
+/// height put off by 5 %.
 fn hand(pace_spread: f64, force_spread: f64) -> Manner {
     Manner {
         pace_spread,
@@ -62,8 +64,8 @@ fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
     }
 }
 
-/// Explorations of these textures in a world: without a sensor of speed, with it, and without it by the table that was learned
-/// with it.
+/// Explorations of these textures in a world: without a sensor of speed, with it, and without it by the table that was
+/// learned with it.
 fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
     let collection = Collection {
         seed,
@@ -108,7 +110,7 @@ fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
 fn a_sensor_of_speed_tells_more_and_its_loss_costs_nothing() {
     let textures: Vec<u8> = (1..=117).step_by(3).collect();
     let mut sums = [Counts::default(); 3];
-    for seed in 1..=2 {
+    for seed in 1..=count(2, 1) {
         let counts = world(seed, &textures, hand(0.25, 0.20));
         sums.iter_mut().zip(counts).for_each(|(sum, c)| sum.add(c));
     }

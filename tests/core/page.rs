@@ -4,6 +4,7 @@ use std::io::{BufWriter, Write as _};
 
 use serde_json::{Value, json};
 use tactus_lab::live::Session;
+use tactus_tests::{count, seeds};
 
 /// Asks, and reads the reply; an error of the session fails the test.
 fn ask(session: &mut Session, request: &Value) -> Value {
@@ -71,8 +72,7 @@ fn an_exploration_is_told_step_by_step() {
         let frame = ask(&mut session, &json!({"do": "step", "ms": 16}));
         let now_ms = frame["at_ms"].as_u64().unwrap();
         assert!(at_ms == 0 || now_ms - at_ms <= 17, "{at_ms} to {now_ms}");
-        at_ms = now_ms;
-        frames += 1;
+        (at_ms, frames) = (now_ms, frames + 1);
         if phases.last() != Some(&frame["phase"]) {
             phases.push(frame["phase"].clone());
         }
@@ -140,7 +140,8 @@ fn a_texture_that_is_new_is_taught_and_found_again() {
 fn a_skin_that_wears_makes_the_known_changed_and_in_the_end_new() {
     let (mut session, known) = probe(&world(20, false, 1.0));
     let mut changed = 0;
-    for at in [0, 3, 6, 9, 12, 15] {
+    let textures = [0, 3, 6, 9, 12, 15].into_iter().take(count(6, 3) as usize);
+    for at in textures.clone() {
         let texture = known["numbers"][at].as_u64().unwrap() as u8;
         let mut told = Vec::new();
         for wear in 0..=20 {
@@ -154,71 +155,74 @@ fn a_skin_that_wears_makes_the_known_changed_and_in_the_end_new() {
         let name = &known["textures"][at];
         assert_eq!(told[0], "sure", "{name} with a new skin");
         assert_eq!(told[20], "new", "{name} without ridges: {told:?}");
-        changed += u32::from(told.iter().any(|told| told == "changed"));
+        changed += usize::from(told.iter().any(|told| told == "changed"));
     }
     // the band between the two limits is narrow
-    assert!(changed >= 3, "{changed} of 6");
+    assert!(changed * 2 >= textures.count(), "{changed}");
 }
 
 #[test]
-fn what_makes_no_sense_is_a_sentence() {
-    let mut session = Session::default();
-    let mut why = |request: Value| {
-        let reply: Value = serde_json::from_str(&session.ask(&request.to_string())).unwrap();
-        assert_eq!(reply["is"], "error", "{request}");
-        reply["why"].as_str().unwrap().to_owned()
-    };
-    assert_eq!(why(json!({"do": "step", "ms": 1})), "there is no probe yet");
-    assert_eq!(why(identify(1, 1)), "there is no probe yet");
-    assert!(why(json!({"do": "dance"})).starts_with("no request: unknown variant"));
-    assert!(why(world(1, false, 1.0)).contains("2 to 117"));
-    let (mut session, _) = probe(&world(5, false, 1.0));
-    let mut why = |request: Value| {
+fn nonsense_is_answered_by_a_sentence() {
+    let why = |session: &mut Session, request: &Value| {
         let reply: Value = serde_json::from_str(&session.ask(&request.to_string())).unwrap();
         reply["why"].as_str().unwrap_or_default().to_owned()
     };
-    assert!(why(identify(118, 1)).contains("1 to 117"));
-    assert!(why(json!({"do": "label", "name": " "})).contains("needs a name"));
+    let mut session = Session::default();
+    for (request, words) in [
+        (json!({"do": "step", "ms": 1}), "there is no probe yet"),
+        (identify(1, 1), "there is no probe yet"),
+        (json!({"do": "dance"}), "no request: unknown variant"),
+        (world(1, false, 1.0), "2 to 117"),
+    ] {
+        let said = why(&mut session, &request);
+        assert!(said.contains(words), "{request}: {said}");
+    }
+    let (mut session, _) = probe(&world(5, false, 1.0));
     let press = json!({"do": "move", "texture": 1, "seed": 1, "force_n": 5.0, "speed_mm_s": 20.0});
-    assert!(!why(press).is_empty());
-    assert_eq!(why(identify(1, 1)), "");
-    assert_eq!(why(identify(1, 1)), "the probe is busy: stop it first");
+    for (request, words) in [
+        (identify(118, 1), "1 to 117"),
+        (json!({"do": "label", "name": " "}), "needs a name"),
+        (press, "N"),
+    ] {
+        let said = why(&mut session, &request);
+        assert!(said.contains(words), "{request}: {said}");
+    }
+    assert_eq!(why(&mut session, &identify(1, 1)), "");
+    assert_eq!(
+        why(&mut session, &identify(1, 1)),
+        "the probe is busy: stop it first"
+    );
 }
 
 #[test]
 fn a_movement_by_hand_is_measured_and_a_stop_lifts() {
     let (mut session, known) = probe(&world(5, false, 1.0));
-    let by_hand = |force_n: f64, speed_mm_s: f64| json!({"do": "move", "texture": 1, "seed": 1, "force_n": force_n, "speed_mm_s": speed_mm_s});
-    ask(&mut session, &by_hand(0.8, 40.0));
-    let all = happenings(&mut session, 100);
-    let moved = of(&all, "moved");
-    assert_eq!(moved.len(), 1, "{all:?}");
-    assert!(moved[0]["measured"]["traction_n"].as_f64().unwrap() > 0.0);
-    assert_eq!(moved[0]["movement"], Value::Null);
+    let mut moved = |force_n: &Value, speed_mm_s: &Value| {
+        let by_hand = json!({"do": "move", "texture": 1, "seed": 1, "force_n": force_n, "speed_mm_s": speed_mm_s});
+        ask(&mut session, &by_hand);
+        let all = happenings(&mut session, 100);
+        let moved = of(&all, "moved");
+        assert_eq!(moved.len(), 1, "{all:?}");
+        moved[0].clone()
+    };
+    let free = moved(&json!(0.8), &json!(40.0));
+    assert!(free["measured"]["traction_n"].as_f64().unwrap() > 0.0);
+    assert_eq!(free["movement"], Value::Null);
     let of_table = &known["movements"][1];
-    ask(
-        &mut session,
-        &by_hand(of_table[0].as_f64().unwrap(), of_table[1].as_f64().unwrap()),
-    );
-    let all = happenings(&mut session, 100);
-    assert_eq!(of(&all, "moved")[0]["movement"], 1);
-    assert!(of(&all, "moved")[0]["place"].is_array());
+    let known = moved(&of_table[0], &of_table[1]);
+    assert_eq!(known["movement"], 1);
+    assert!(known["place"].is_array());
     ask(&mut session, &identify(1, 1));
-    for _ in 0..30 {
-        ask(&mut session, &json!({"do": "step", "ms": 100}));
-    }
+    ask(&mut session, &json!({"do": "step", "ms": 3000}));
     ask(&mut session, &json!({"do": "stop"}));
     let all = happenings(&mut session, 100);
-    assert_eq!(
-        of(&all, "verdict").len() + of(&all, "refused").len(),
-        1,
-        "{all:?}"
-    );
+    let ended = of(&all, "verdict").len() + of(&all, "refused").len();
+    assert_eq!(ended, 1, "{all:?}");
     assert_eq!(explore(&mut session, 1, 2)["told"], "sure");
 }
 
-/// With TACTUS_PAGE_REPLIES, `cargo xtask test --step page` asks the same in WebAssembly and compares the replies byte by byte: 50
-/// seeds, each another texture, then a lesson, at last the paper's method.
+/// With TACTUS_PAGE_REPLIES, `cargo xtask test --step page` asks the same in WebAssembly and compares the replies byte
+/// by byte: of some seeds, each another texture, then a lesson, at last the paper's method.
 #[test]
 fn replies() {
     let mut session = Session::default();
@@ -249,8 +253,8 @@ fn replies() {
     let prepare = json!({"do": "prepare"});
     ask(&world(20, false, 1.0));
     ask(&prepare);
-    for seed in 1..=50_u32 {
-        done(&mut ask, identify((seed * 7 % 117 + 1) as u8, seed));
+    for seed in seeds(50) {
+        done(&mut ask, identify((seed * 7 % 117 + 1) as u8, seed as u32));
     }
     done(&mut ask, json!({"do": "label", "name": "learned here"}));
     ask(&world(30, true, 0.0));

@@ -1,10 +1,7 @@
 //! Presses on soft and hard things, with P_DC sound, dead, dying and leaking. What counts is the world's own force.
 //!
-//! The whole campaign takes about an hour: `cargo test --release -p tactus-tests --test presses -- --ignored --nocapture`,
-//! every seventh rig of it with `TACTUS_PRESSES_EVERY=7`, or one of its worlds with `TACTUS_PRESSES_WORLD=63`, as `cargo xtask
-//! seeds press` does.
-
-use std::collections::BTreeMap;
+//! The whole campaign takes about an hour: `cargo xtask campaign press`, which gives a world by `TACTUS_PRESSES_WORLD`;
+//! every seventh rig of it with `TACTUS_PRESSES_EVERY=7`.
 
 use rayon::prelude::*;
 use tactus_core::features::Movement;
@@ -12,56 +9,30 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Fault, Phase};
 use tactus_core::sensor::FingerName;
 use tactus_lab::sim::collection::Collection;
-use tactus_lab::sim::press::{self, Bench, Campaign, FORCE_LIMIT_N, Press, Trouble};
-use tactus_lab::sim::rig::SimRig;
+use tactus_lab::sim::rig::{FORCE_LIMIT_N, SimRig};
+use tactus_tests::{count, seeds};
 use tactus_world::faults::Fault as Cause;
 use tactus_world::mount::Mount;
 use tactus_world::world::Setup;
 
-/// Prints how the presses ended, and objects to those that were too hard, and to sound ones that were not made.
+use crate::press::{self, Bench, Campaign, Press, Trouble};
+use crate::rigs::texture;
+
+/// Objects to presses that were too hard, and to sound ones that were refused.
 fn judge(presses: &[Press]) {
-    let mut ends = BTreeMap::new();
-    for press in presses {
-        let ended = match &press.ended {
-            Ok(ended) => format!("{ended:?}"),
-            Err(error) => error.to_string(),
-        };
-        let (count, most) = ends
-            .entry((format!("{:?}", press.bench.trouble), ended))
-            .or_insert((0_u32, 0.0_f64));
-        *count += 1;
-        *most = most.max(press.force_max_n);
-    }
     println!("{} presses", presses.len());
-    for ((trouble, ended), (count, most)) in ends {
-        println!("{trouble:8} {count:6}  {most:.3} N at most  {ended}");
-    }
-    let hard: Vec<_> = presses.iter().filter(|p| p.is_too_hard()).collect();
-    let objections = |presses: &[&Press]| {
-        let lines: Vec<_> = presses.iter().take(40).map(ToString::to_string).collect();
-        lines.join("\n")
-    };
-    assert!(
-        hard.is_empty(),
-        "{} too hard\n{}",
-        hard.len(),
-        objections(&hard)
-    );
-    let refused = |p: &&Press| p.bench.trouble == Trouble::Sound && p.ended != Ok(Ended::Whole);
-    let refused: Vec<_> = presses.iter().filter(refused).collect();
-    println!("{}", objections(&refused));
     let progress = [Fault::PressureDead, Fault::LeverSlips].map(|fault| Err(fault.into()));
-    assert!(
-        refused.iter().all(|p| !progress.contains(&p.ended)),
-        "sound ones were refused"
-    );
+    let refused = |p: &Press| p.bench.trouble == Trouble::Sound && progress.contains(&p.ended);
+    let wrong = presses.iter().filter(|p| p.is_too_hard() || refused(p));
+    let wrong: Vec<_> = wrong.take(40).map(ToString::to_string).collect();
+    assert_eq!(wrong, [""; 0]);
 }
 
 #[test]
 fn a_sample_of_the_campaign_presses_nothing_too_hard() {
     let campaign = Campaign {
         worlds: 1..=100,
-        every: 397,
+        every: 1999 / count(5, 1) as usize,
         unguarded: Unguarded::default(),
     };
     judge(&campaign.run(|| ()));
@@ -126,10 +97,11 @@ fn the_softest_foam_is_pressed_with_two_newtons() {
     }
 }
 
-/// A rig over a stiff, a soft, a rough and a furry sample of worlds.
-fn rigs() -> impl Iterator<Item = (String, SimRig)> {
-    let samples = (1..=2).flat_map(|world| [45, 30, 100, 117].map(|texture| (world, texture)));
-    samples.map(|(seed, texture)| {
+/// A rig over a stiff, a soft, a rough and a furry sample: of world 1 in the test command.
+fn rigs() -> Vec<(String, SimRig)> {
+    let samples =
+        (1..=count(2, 1)).flat_map(|world| [45, 30, 100, 117].map(|texture| (world, texture)));
+    let rig = |(seed, texture)| {
         let world = Collection {
             seed,
             textures: Vec::new(),
@@ -140,34 +112,51 @@ fn rigs() -> impl Iterator<Item = (String, SimRig)> {
             ..world.setup(texture, 950)
         };
         (format!("world {seed}, T{texture}"), SimRig::new(setup))
-    })
+    };
+    samples.map(rig).collect()
+}
+
+/// Presses while the skin leaks in so many seconds, from this share of the force on.
+fn leaks(sample: &str, rig: &mut SimRig, force_mn: u16, each_s: &[f64], shares: &[f64]) {
+    let movement = Movement::new(force_mn, 39_811).unwrap();
+    // every third of them in the test command, at each force others
+    let step = 3 / count(3, 1) as usize;
+    for &seconds in each_s
+        .iter()
+        .skip(usize::from(force_mn) % step)
+        .step_by(step)
+    {
+        for &share in shares {
+            let leak = Some((Cause::SkinLeaks { seconds }, share));
+            let ended = press::make(rig, movement, leak);
+            let most_n = rig.world().truth().force_max_n;
+            assert!(
+                most_n <= FORCE_LIMIT_N,
+                "{sample}, {movement}, {seconds} s at {share}: {most_n:.2} N, {ended:?}"
+            );
+        }
+    }
 }
 
 /// At the forces that a probe makes, however slowly the skin leaks.
 #[test]
 fn no_leak_of_a_tenth_of_a_second_or_more_presses_too_hard() {
-    for (sample, mut rig) in rigs() {
+    const SECONDS: [f64; 10] = [0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0];
+    rigs().into_par_iter().for_each(|(sample, mut rig)| {
         for force_mn in [200, 500, 1259] {
-            let movement = Movement::new(force_mn, 39_811).unwrap();
-            for seconds in [0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0] {
-                for share in [0.0, 0.5] {
-                    let leak = Some((Cause::SkinLeaks { seconds }, share));
-                    let ended = press::make(&mut rig, movement, leak);
-                    let most_n = rig.world().truth().force_max_n;
-                    assert!(
-                        most_n <= FORCE_LIMIT_N,
-                        "{sample}, {movement}, {seconds} s at {share}: {most_n:.2} N, {ended:?}"
-                    );
-                }
-            }
+            leaks(&sample, &mut rig, force_mn, &SECONDS, &[0.0, 0.5]);
         }
-    }
+    });
 }
 
-/// Over seconds a leak looks like a sample that gives way: beyond the probe's forces the lever stands on its way and looks.
+/// Over seconds a leak looks like a sample that gives way: beyond the probe's forces the lever stands on its way and
+/// looks.
 #[test]
 fn no_slow_leak_presses_too_hard_at_two_newtons() {
-    for (sample, mut rig) in rigs() {
+    const SECONDS: [f64; 12] = [
+        0.1, 0.5, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0,
+    ];
+    rigs().into_par_iter().for_each(|(sample, mut rig)| {
         rig.control().allow_high_force(true);
         for force_mn in [1585, 1995] {
             let movement = Movement::new(force_mn, 39_811).unwrap();
@@ -175,21 +164,15 @@ fn no_slow_leak_presses_too_hard_at_two_newtons() {
             let sound = press::make(&mut rig, movement, None);
             let good = sound == Ok(Ended::Whole) || sound == Err(Fault::ForceHigh.into());
             assert!(good, "{sample}, {movement}: {sound:?}");
-            for seconds in [
-                0.1, 0.5, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0,
-            ] {
-                for share in [0.0, 0.3, 0.55, 0.8] {
-                    let leak = Some((Cause::SkinLeaks { seconds }, share));
-                    let ended = press::make(&mut rig, movement, leak);
-                    let most_n = rig.world().truth().force_max_n;
-                    assert!(
-                        most_n <= FORCE_LIMIT_N,
-                        "{sample}, {movement}, {seconds} s at {share}: {most_n:.2} N, {ended:?}"
-                    );
-                }
-            }
+            leaks(
+                &sample,
+                &mut rig,
+                force_mn,
+                &SECONDS,
+                &[0.0, 0.3, 0.55, 0.8],
+            );
         }
-    }
+    });
 }
 
 /// A skin that tears at once shows contact in neither signal: the place of the last contact has to stop the lever.
@@ -267,7 +250,7 @@ fn two_presses(finger: FingerName, seed: u64) -> Pressed {
         textures: Vec::new(),
         trials: 1,
     };
-    let texture = (1 + seed * 37 % 117) as u8;
+    let texture = texture(seed);
     let setup = Setup {
         shimmed: true,
         ..collection.setup_with(finger, texture, 1)
@@ -313,43 +296,35 @@ fn two_presses(finger: FingerName, seed: u64) -> Pressed {
     pressed
 }
 
-/// 50 seeds of each finger: soon ready, soon pressed, and never by much more than was asked for.
+/// Rigs of each finger: soon ready, soon pressed, and never by much more than was asked for.
 #[test]
 fn a_rig_is_soon_ready_and_presses_soon_and_no_harder() {
     for finger in [FingerName::Biotac, FingerName::Analog, FingerName::Mems] {
-        let rigs: Vec<_> = (1..=50)
-            .into_par_iter()
-            .map(|seed| two_presses(finger, seed))
-            .collect();
+        let seeds: Vec<u64> = seeds(50).collect();
+        let rigs = seeds.into_par_iter().map(|seed| two_presses(finger, seed));
+        let rigs: Vec<Pressed> = rigs.collect();
+        // median, largest, smallest
         let sorted = |of: fn(&Pressed) -> f64| {
             let mut values: Vec<f64> = rigs.iter().map(of).collect();
             values.sort_by(f64::total_cmp);
-            (values[25], values[49], values[0])
+            (
+                values[values.len() / 2],
+                values[values.len() - 1],
+                values[0],
+            )
         };
+        for rig in &rigs {
+            let (name, most, off) = (&rig.name, rig.most, rig.off_n);
+            assert!(most < 1.15, "{name}: {most} of what was asked for");
+            assert!(off < 1.0, "{name}: off by {off} of what may be");
+        }
         let ready = sorted(|rig| rig.ready_s);
         let pressed = [
             sorted(|rig| rig.pressed_s[0]),
             sorted(|rig| rig.pressed_s[1]),
         ];
-        let (most, off) = (sorted(|rig| rig.most), sorted(|rig| rig.off_n));
         let stage = sorted(|rig| rig.stage_off_mm);
-        println!(
-            "{finger}: ready {ready:.2?}, pressed {pressed:.2?}, most {most:.3?}, off {off:.3?}, stage {stage:.3?}"
-        );
-        for rig in &rigs {
-            assert!(
-                rig.most < 1.15,
-                "{}: {} of what was asked for",
-                rig.name,
-                rig.most
-            );
-            assert!(
-                rig.off_n < 1.0,
-                "{}: off by {} of what may be",
-                rig.name,
-                rig.off_n
-            );
-        }
+        println!("{finger}: ready {ready:.2?}, pressed {pressed:.2?}, stage {stage:.3?}");
         assert!(ready.0 < 5.0 && ready.1 < 7.0, "{ready:?}");
         assert!(pressed[0].0 < 6.0 && pressed[1].0 < 5.0, "{pressed:?}");
         // the switch is touched slowly: it closes at the same place

@@ -1,9 +1,10 @@
-//! A table after the finger was replaced: what the probe is told of simulated textures before and after it was refreshed.
+//! A table after the finger was replaced: what the probe is told of simulated textures before and after it was
+//! refreshed.
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{Config, Explorer, Method, Told};
+use tactus_core::explorer::{Config, Explorer, Method, VerdictKind};
 use tactus_core::features::{Observation, PropertySet, Slide};
 use tactus_core::probe::explore::explore;
 use tactus_core::rig::Rig as _;
@@ -13,6 +14,7 @@ use tactus_core::table::{Contents, Table};
 use tactus_lab::eval::refresh::{NewSlide, refresh};
 use tactus_lab::sim::collection::{Collection, calibrated};
 use tactus_lab::sim::rig::SimRig;
+use tactus_tests::count;
 use tactus_world::Conditions;
 use tactus_world::world::Setup;
 
@@ -42,8 +44,8 @@ fn rig(finger: Finger, setup: Setup) -> SimRig {
     rig
 }
 
-/// Of all textures in two trials: the share that is told by name, and how many by a wrong one.
-fn told(world: &Collection, bytes: &[u8], finger: Finger) -> (f64, usize) {
+/// Of all textures in two trials, the share that is told by name.
+fn told(world: &Collection, bytes: &[u8], finger: Finger) -> f64 {
     let table = Table::read(bytes).unwrap();
     let config = Config {
         method: Method::Fused,
@@ -54,19 +56,17 @@ fn told(world: &Collection, bytes: &[u8], finger: Finger) -> (f64, usize) {
         .zip(&world.textures)
         .flat_map(|(at, texture)| [11, 12].map(|trial| (at, *texture, trial)))
         .collect();
-    let told: Vec<Option<bool>> = visits
+    let told = visits
         .par_iter()
-        .map(|(at, texture, trial)| {
+        .filter(|(at, texture, trial)| {
             let mut rig = rig(finger, world.setup(*texture, *trial));
             let mut explorer = Explorer::<'_, 128>::new(table, PropertySet::ALL, config).unwrap();
             let verdict = block_on(explore(&mut rig, &mut explorer, &Plan::new(), || 0, |_| {}));
             let verdict = verdict.unwrap();
-            (verdict.told() == Told::Sure).then_some(verdict.texture == *at)
+            verdict.kind() == VerdictKind::Sure && verdict.texture == *at
         })
-        .collect();
-    let right = told.iter().filter(|told| **told == Some(true)).count();
-    let wrong = told.iter().filter(|told| **told == Some(false)).count();
-    (right as f64 / told.len() as f64, wrong)
+        .count();
+    told as f64 / visits.len() as f64
 }
 
 /// So many slides of each texture at each movement by this finger.
@@ -94,14 +94,13 @@ fn slides(world: &Collection, table: Table<'_>, finger: Finger, count: usize) ->
     each.flatten().collect()
 }
 
-/// `REFRESH_SEEDS=50 cargo test -p tactus-tests --test refresh -- --nocapture` takes half an hour of a core. Of 50 worlds, 0.995 of the
-/// textures were told before, 0.001 with the new finger, 0.807 after one slide of each (by world 0.11), 0.476 after one of every
-/// second one (0.13), and 0.873 after three of each.
+/// Of 50 worlds, 0.995 of the textures were told before, 0.001 with the new finger, 0.807 after one slide of each (by
+/// world 0.11), 0.476 after one of every second one (0.13), and 0.873 after three of each.
 #[test]
 fn one_slide_of_each_texture_brings_most_of_a_replaced_fingers_table_back() {
     let mut sums = [0.0; 5];
-    let count = std::env::var("REFRESH_SEEDS").map_or(3, |count| count.parse::<u32>().unwrap());
-    for seed in 5..5 + u64::from(count) {
+    let count = count(50, 2);
+    for seed in 5..5 + count {
         let world = world(seed);
         let calibration = |finger_seed| {
             let setup = world.setup(10, 0);
@@ -132,18 +131,8 @@ fn one_slide_of_each_texture_brings_most_of_a_replaced_fingers_table_back() {
             told(&world, &half.bytes, new),
             told(&world, &three.bytes, new),
         ];
-        println!(
-            "world {seed}: before {:?}, replaced {:?}, refreshed {:?}, half of them {:?}; together {:.2}, moved {:?}, alike {:?}",
-            with[0],
-            with[1],
-            with[2],
-            with[3],
-            refreshed.together,
-            &refreshed.moved[..3],
-            refreshed.alike
-        );
-        for (sum, (right, _)) in sums.iter_mut().zip(with) {
-            *sum += right / f64::from(count);
+        for (sum, right) in sums.iter_mut().zip(with) {
+            *sum += right / count as f64;
         }
         assert_eq!(refreshed.moved.len(), 12);
         // what is limits, drift and population stays
@@ -157,7 +146,7 @@ fn one_slide_of_each_texture_brings_most_of_a_replaced_fingers_table_back() {
     );
     assert!(replaced < before - 0.3, "the finger is not another one");
     // three standard errors of the mean below what 50 worlds came to
-    let least = |mean: f64, by_world: f64| mean - 3.0 * by_world / f64::from(count).sqrt();
+    let least = |mean: f64, by_world: f64| mean - 3.0 * by_world / (count as f64).sqrt();
     assert!(refreshed > least(0.807, 0.11));
     assert!(half > least(0.476, 0.13));
     assert!(three > least(0.807, 0.11));

@@ -4,12 +4,10 @@ mod args;
 mod completions;
 mod convert;
 mod device;
-mod environment;
 mod evaluate;
 mod features;
 mod identify;
 mod import;
-mod known;
 mod learn;
 
 mod names;
@@ -23,28 +21,28 @@ mod table;
 mod table_file;
 mod textures;
 mod unpack;
-mod verbose;
 mod verify;
 
 use std::io::{self, Write as _};
 
-use clap::{ArgAction, CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
-#[command(name = "tactus", version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
-fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
-Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = after_help())]
+#[command(
+    name = "tactus",
+    version,
+    about = "Tactus tells what a surface is by touching it",
+    long_about = LONG_ABOUT,
+    after_help = after_help()
+)]
 struct Tactus {
     /// Show no progress and no notices on the terminal, only results and errors
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Tell on standard error which files are read and written, and what is chosen; twice (-vv): also every frame to and from a probe
-    #[arg(long, short, global = true, action = ArgAction::Count)]
-    verbose: u8,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -54,8 +52,7 @@ struct Tactus {
 enum Command {
     Features(features::Args),
     Learn(learn::Args),
-    #[command(subcommand)]
-    Table(table::Command),
+    Table(table::Args),
     Report(report::Args),
     Identify(identify::Args),
     Evaluate(evaluate::Args),
@@ -65,12 +62,17 @@ enum Command {
     Study(study::Args),
     #[command(subcommand)]
     Device(device::Command),
-    Textures(known::Args),
     Completions(completions::Args),
     Import(import::Args),
     Convert(convert::Args),
     Unpack(unpack::Args),
 }
+
+const LONG_ABOUT: &str = "\
+Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and fineness,
+and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & Loeb 2012).
+
+This command runs the core of the firmware, the same code, on recordings and on a simulated rig.";
 
 /// What to try first, and what scripts need to know.
 fn after_help() -> String {
@@ -84,16 +86,10 @@ Environment:
 
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
-/// Runs what the arguments ask for.
 pub(crate) fn run() -> anyhow::Result<Done> {
     let out = &mut io::BufWriter::new(io::stdout().lock());
     let mut done = Done::Fully;
-    let Tactus {
-        quiet,
-        verbose,
-        command,
-    } = Tactus::parse();
-    verbose::be_verbose(verbose);
+    let Tactus { quiet, command } = Tactus::parse();
     if quiet {
         progress::be_quiet();
     }
@@ -101,7 +97,7 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         None => identify::demonstrate(out)?,
         Some(Command::Features(args)) => features::run(&args, out)?,
         Some(Command::Learn(args)) => learn::run(&args, out)?,
-        Some(Command::Table(command)) => table::run(&command, out)?,
+        Some(Command::Table(args)) => table::run(&args, out)?,
         Some(Command::Report(args)) => report::run(&args, out)?,
         Some(Command::Identify(args)) => done = identify::run(&args, out)?,
         Some(Command::Evaluate(args)) => evaluate::run(&args, out)?,
@@ -110,7 +106,6 @@ pub(crate) fn run() -> anyhow::Result<Done> {
         Some(Command::LearnByHand(args)) => learn::by_hand(&args, out)?,
         Some(Command::Study(args)) => study::run(&args, out)?,
         Some(Command::Device(command)) => done = device::run(&command, out)?,
-        Some(Command::Textures(args)) => known::run(&args, out)?,
         Some(Command::Completions(args)) => completions::run(&args, Tactus::command(), out)?,
         Some(Command::Import(args)) => import::run(&args, out)?,
         Some(Command::Convert(args)) => convert::run(&args, out)?,

@@ -7,7 +7,7 @@ use std::path::Path;
 use tactus_core::sensor::FingerName;
 use tactus_lab::eval::show::count;
 use tactus_lab::sim::handheld::ground;
-use tactus_lab::sim::scenario::{InvalidScenario, Scenario, Step, TIMEOUT_S, texture};
+use tactus_lab::sim::scenario::{Scenario, Step, TIMEOUT_S, UnknownTexture, texture};
 use tactus_world::faults::Fault;
 use tactus_world::flow::HEIGHT_MM;
 use tactus_world::person::Hand;
@@ -33,7 +33,7 @@ const OPEN: &str = "Slide on to be sure";
 pub enum PlayError {
     /// An unknown texture.
     #[error(transparent)]
-    Texture(#[from] InvalidScenario),
+    Texture(#[from] UnknownTexture),
     /// The emulator.
     #[error(transparent)]
     Emulator(#[from] Error),

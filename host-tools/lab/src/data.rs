@@ -1,6 +1,5 @@
 //! Recordings of slides, tables of properties, and what is read from other formats.
 
-pub mod content;
 pub mod import;
 pub mod program;
 pub mod properties;
@@ -11,3 +10,13 @@ pub mod replay;
 pub mod rows;
 pub mod table_file;
 pub mod whole;
+
+/// The rows of a table in a test, their cells divided by `|`.
+#[cfg(test)]
+pub(crate) fn cells<const N: usize>(table: &str) -> impl Iterator<Item = [&str; N]> {
+    let rows = table.lines().filter(|row| !row.is_empty());
+    rows.map(|row| {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        cells.try_into().unwrap_or_else(|row| panic!("{row:?}"))
+    })
+}

@@ -9,7 +9,6 @@ pub mod experiment;
 pub mod first;
 pub mod gauge;
 pub mod learn;
-pub mod lifelong;
 pub mod novelty;
 mod pace;
 pub mod places;

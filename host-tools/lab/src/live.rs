@@ -11,11 +11,11 @@ mod session;
 mod slides;
 mod standing;
 
-pub use message::{Expected, Frame, Happening, KnownTable, Measured, Reply, Request, Settings};
-pub use monitor::{ProbeMonitor, Received, spectra};
-pub use session::{Session, sentence};
-pub use slides::{TRIALS, Trials, WORLD, WorldError, bring_world, world_table};
-pub use standing::Standing;
+pub(crate) use message::{Happening, KnownTable};
+pub(crate) use monitor::{ProbeMonitor, Received};
+pub use session::Session;
+pub(crate) use session::{asked_in_json, sentence};
+pub use slides::bring_world;
 
 #[cfg(test)]
 mod tests;

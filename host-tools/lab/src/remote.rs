@@ -1,22 +1,13 @@
 //! A probe at a line that somebody else carries, a page for example: [`Remote`] is asked in JSON, gets the bytes that
-//! came and the time, and gives back bytes to be sent and what has happened. What it does and says is what `tactus
-//! device` does and says.
+//! came and the time, and gives back bytes to send and what has happened. It does and says what `tactus device` does
+//! and says.
 
-#[cfg(feature = "open")]
-pub mod mcap;
+mod heard;
 mod message;
-#[cfg(feature = "open")]
-mod open;
 pub mod operations;
-#[cfg(feature = "open")]
-mod recorded;
-mod replay;
 pub mod say;
 mod session;
-pub mod verifying;
+mod verifying;
 mod work;
 
-pub use message::{File, Folder, Frame, Question, Reply, Request, Streams, Work};
-#[cfg(feature = "open")]
-pub use open::OpenError;
 pub use session::Remote;

@@ -105,12 +105,17 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Whether nothing differs by more than [`ALLOWED`], and there was something to compare.
+    /// The largest of all differences.
+    pub fn largest(&self) -> f32 {
+        let all = [self.properties, self.signal, self.posterior, self.expected];
+        all.into_iter().fold(0.0, f32::max)
+    }
+
+    /// Returns true where nothing differs by more than [`ALLOWED`], and there was something to compare.
     pub fn agrees(&self) -> bool {
-        let largest = [self.properties, self.signal, self.posterior, self.expected];
         self.slides > 0
             && self.posteriors > 0
-            && largest.into_iter().all(|d| d <= ALLOWED)
+            && self.largest() <= ALLOWED
             && self.other_choices.is_empty()
             && self.rejected_only_there == 0
             && self.other_verdicts == 0
@@ -140,9 +145,6 @@ pub struct Follower<'t> {
 
 impl<'t> Follower<'t> {
     /// A follower of the exploration that was asked for, on the probe's table, with a rig that measures `measured`.
-    ///
-    /// # Errors
-    /// See [`ExplorerError`].
     pub fn new(
         table: Table<'t>,
         measured: PropertySet,
@@ -175,9 +177,6 @@ impl<'t> Follower<'t> {
     }
 
     /// Takes in what the probe says, report by report.
-    ///
-    /// # Errors
-    /// See [`FollowError`]: something could not be compared.
     pub fn hear(&mut self, event: &Event) -> Result<(), FollowError> {
         match event {
             Event::Chosen {
@@ -239,7 +238,6 @@ impl<'t> Follower<'t> {
         }
     }
 
-    /// The number of the slide that is due.
     fn due(&self) -> u8 {
         self.explorer.slides().saturating_add(1)
     }

@@ -8,9 +8,8 @@ use std::time::Duration;
 
 use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
 
-use super::lock::{PortInUse, PortLock};
+use super::lock::PortLock;
 
-/// The probe's line.
 const BAUD: u32 = 921_600;
 /// Reads come back after that, so that somebody looks at the keyboard; writes may take as long.
 const READ: Duration = Duration::from_millis(50);
@@ -20,12 +19,9 @@ const ST: u16 = 0x0483;
 /// An error on the way to a line, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
-    /// Nothing is plugged in.
-    #[error(
-        "no serial port of a NUCLEO here: plug in the board's USB socket CN1 (LD4 must be lit), give --port, or try \
-             --emulated"
-    )]
-    None,
+    /// No board is plugged in.
+    #[error("no NUCLEO here: plug in its USB socket CN1 (LD4 must be lit), or give --port. {}", others(.0))]
+    None(Vec<PortInfo>),
     /// More than one.
     #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
     Several(Vec<PortInfo>),
@@ -41,12 +37,14 @@ pub enum LineError {
     #[error(
         "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close \
              that; \
-         `fuser -v {0}` names it"
+             `fuser -v {0}` names it"
     )]
     Busy(String),
     /// Another tactus has it.
-    #[error(transparent)]
-    InUse(#[from] PortInUse),
+    #[error(
+        "{0} is used by another tactus: wait for it or end it, it cannot be watched from a second command"
+    )]
+    InUse(String),
     /// The user may not.
     #[error(
         "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
@@ -78,12 +76,11 @@ pub struct PortInfo {
     /// Its name.
     pub name: String,
     /// The USB device's description of itself, if it is one.
-    pub usb: Option<UsbPortInfo>,
+    pub(crate) usb: Option<UsbPortInfo>,
 }
 
 impl PortInfo {
-    /// Returns true for an ST-LINK, as a NUCLEO has.
-    pub fn is_nucleo(&self) -> bool {
+    fn is_nucleo(&self) -> bool {
         self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
     }
 }
@@ -119,16 +116,14 @@ impl fmt::Display for PortInfo {
     }
 }
 
-/// A line for each.
-pub fn lines(ports: &[PortInfo]) -> String {
+fn lines(ports: &[PortInfo]) -> String {
     let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
     lines.join("\n")
 }
 
 fn others(found: &[PortInfo]) -> String {
     if found.is_empty() {
-        "This PC has no serial port now: plug in the board's USB socket CN1, or try --emulated"
-            .to_owned()
+        "This PC has no serial port now".to_owned()
     } else {
         format!("There are:\n{}", lines(found))
     }
@@ -152,31 +147,25 @@ pub trait Line: Read + Write + Send {}
 impl<T: Read + Write + Send> Line for T {}
 
 /// Opens the port of this name, and keeps other commands from it.
-///
-/// # Errors
-/// See [`LineError`].
 pub fn open(name: &str) -> Result<(Box<dyn Line>, PortLock), LineError> {
     // however its address was written
     let same = tcp_address(name).map(|address| format!("tcp:{address}"));
-    let lock = PortLock::take(same.as_deref().unwrap_or(name))?;
+    let lock = PortLock::take(same.as_deref().unwrap_or(name));
+    let lock = lock.ok_or_else(|| LineError::InUse(name.to_owned()))?;
     let line = match tcp_address(name) {
         Some(address) => tcp(address)?,
         None => serial(name)?,
     };
-    tracing::info!(port = name, "opens");
     Ok((line, lock))
 }
 
 /// The only NUCLEO among these.
-///
-/// # Errors
-/// There is none, or there are several.
 pub fn only_nucleo(found: Vec<PortInfo>) -> Result<String, LineError> {
-    let mut nucleos: Vec<PortInfo> = found.into_iter().filter(PortInfo::is_nucleo).collect();
-    match nucleos.len() {
-        0 => Err(LineError::None),
-        1 => Ok(nucleos.remove(0).name),
-        _ => Err(LineError::Several(nucleos)),
+    let nucleos: Vec<&PortInfo> = found.iter().filter(|port| port.is_nucleo()).collect();
+    match nucleos.as_slice() {
+        [] => Err(LineError::None(found)),
+        [only] => Ok(only.name.clone()),
+        _ => Err(LineError::Several(nucleos.into_iter().cloned().collect())),
     }
 }
 
@@ -210,9 +199,6 @@ fn serial(port: &str) -> Result<Box<dyn Line>, LineError> {
 }
 
 /// Opens a TCP port, "HOST:PORT".
-///
-/// # Errors
-/// [`LineError::Tcp`].
 pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
     let error = |why| LineError::Tcp {
         address: address.to_owned(),
@@ -272,10 +258,7 @@ mod tests {
             "/dev/ttyACM0"
         );
         let none = only_nucleo(vec![other]).unwrap_err().to_string();
-        assert!(
-            none.contains("CN1") && none.contains("--emulated"),
-            "{none}"
-        );
+        assert!(none.contains("CN1") && none.contains("ttyUSB0"), "{none}");
         let both = only_nucleo(vec![a, b]).unwrap_err().to_string();
         assert!(
             both.contains("--port") && both.contains("ttyACM0") && both.contains("ttyACM1"),

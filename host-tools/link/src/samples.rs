@@ -2,7 +2,7 @@
 //! slide on
 //! the same track again says little about a texture.
 
-use tactus_core::table::{EncodeError, Table, samples_length, with_moved};
+use tactus_core::table::{EncodeError, Table, with_moved};
 
 /// Returns what is true of all of these; `None` where it is not known of one, they differ, or there is none.
 pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
@@ -12,17 +12,14 @@ pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
 }
 
 /// The table with this note of each texture, by its index, in place of what it says of that.
-///
-/// # Errors
-/// These bytes are no table.
 pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let says = |texture| table.moved(texture);
     if (0..table.textures()).all(|texture| says(texture) == moved(texture)) {
         return Ok(table.as_bytes().to_vec());
     }
-    let most = table.as_bytes().len() + samples_length(table.textures().into());
-    let mut noted = vec![0; most];
+    // a section of 5 bytes for each texture
+    let mut noted = vec![0; table.as_bytes().len() + 8 + 5 * usize::from(table.textures())];
     let length = with_moved(&mut noted, &table, moved)?.as_bytes().len();
     noted.truncate(length);
     Ok(noted)
@@ -66,9 +63,6 @@ pub enum Noting {
 }
 
 /// Notes how the trials of a texture were made, in the table that a probe uses.
-///
-/// # Errors
-/// These bytes are no table.
 pub fn noting(bytes: &[u8], name: &str, moved: Option<bool>) -> Result<Noting, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let Some(texture) = table.find(name).filter(|&t| table.moved(t) != moved) else {

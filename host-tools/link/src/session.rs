@@ -1,7 +1,5 @@
 //! Turns requests into frames and received bytes into reports; the errors of a transaction.
 
-use std::fmt;
-
 use tactus_core::rig::calibration::RigCalibrationError;
 use tactus_core::table::{MAX_TEXTURES, TableError};
 use tactus_core::wire::{
@@ -12,7 +10,6 @@ use tactus_core::wire::{
 /// A request that may be made twice is made so often before the line is given up.
 pub const MAX_TRIES: u8 = 5;
 
-/// What to do about a probe that speaks this version.
 fn remedy(of: &u8) -> &'static str {
     if *of > PROTOCOL {
         "this program is older, install the tactus of the probe's version, or flash this one's firmware: `tactus \
@@ -86,15 +83,6 @@ fn quoted(words: &Option<String>) -> String {
         .unwrap_or_default()
 }
 
-/// The name of a message without what it holds; empty where nobody is told.
-fn kind(of: &impl fmt::Debug) -> String {
-    if !tracing::enabled!(tracing::Level::DEBUG) {
-        return String::new();
-    }
-    let all = format!("{of:?}");
-    all.chars().take_while(|c| c.is_alphanumeric()).collect()
-}
-
 /// Requests get their numbers here, and received bytes become reports.
 #[derive(Debug, Default)]
 pub struct Session {
@@ -109,15 +97,10 @@ pub struct Session {
 
 impl Session {
     /// Appends the bytes of a request to `send`, and says its id. A 0 goes before it: what was on the line ends there.
-    ///
-    /// # Errors
-    /// [`TooLong`].
     pub fn request(&mut self, command: Command, send: &mut Vec<u8>) -> Result<u16, TooLong> {
         let id = self.next_id;
-        let kind = kind(&command);
         let mut buffer = [0; MAX_FRAME + 1];
         let frame = wire::encode(&wire::Request { id, command }, &mut buffer)?;
-        tracing::debug!(id, command = kind, bytes = frame.len(), "sends");
         self.next_id = id.wrapping_add(1);
         send.push(0);
         send.extend_from_slice(frame);
@@ -131,7 +114,6 @@ impl Session {
             match self.receiver.push::<Report>(byte) {
                 None => {}
                 Some(Err(why)) => {
-                    tracing::info!(%why, "a damaged frame");
                     self.damaged += 1;
                     self.foreign += u64::from(why == FrameError::Message);
                 }
@@ -141,13 +123,8 @@ impl Session {
                         (self.expected, matches!(report.event, Event::Booted { .. }))
                     {
                         let missing = report.number.wrapping_sub(expected);
-                        if missing > 0 {
-                            tracing::info!(missing, before = report.number, "reports are lost");
-                        }
                         self.missing += u64::from(missing);
                     }
-                    let (number, at_ms) = (report.number, report.at_ms);
-                    tracing::debug!(number, at_ms, event = kind(&report.event), "receives");
                     self.expected = Some(report.number.wrapping_add(1));
                     reports.push(report);
                 }

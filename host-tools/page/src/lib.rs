@@ -1,6 +1,6 @@
 //! Tactus in a browser: a simulated probe, [`Session`], and one at a line, [`Remote`], as WebAssembly, asked in JSON.
 //!
-//! Six functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
+//! Five functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
 //! writes a request where [`request`] says, calls [`ask`] or [`remote`], and reads the reply where [`reply`] says. The module imports
 //! nothing.
 
@@ -47,16 +47,7 @@ pub extern "C" fn ask() -> usize {
     })
 }
 
-/// The request's bytes are those of a file, which a request of [`remote`] names then.
-#[unsafe(no_mangle)]
-pub extern "C" fn give() {
-    PAGE.with_borrow_mut(|page| {
-        let bytes = std::mem::take(&mut page.request);
-        page.remote.give(bytes);
-    });
-}
-
-/// The same for the probe at a line, or files that were given.
+/// The same for the probe at a line.
 #[unsafe(no_mangle)]
 pub extern "C" fn remote() -> usize {
     PAGE.with_borrow_mut(|page| {

@@ -87,9 +87,13 @@ export async function tab(browser, { width, height, touch = false, scheme = "lig
     if (method === "Network.requestWillBeSent" && !params.request.url.startsWith("data:")) loaded.push(params.request.url);
   });
   for (const domain of ["Page", "Runtime", "Log", "Network"]) await send(`${domain}.enable`);
-  await send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: touch });
-  await send("Emulation.setTouchEmulationEnabled", { enabled: touch });
-  await send("Emulation.setEmulatedMedia", { features: [{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: motion }] });
+  /// Gives the page this size and these colours; a narrow one is a phone's.
+  const size = async (width, height, touch, scheme = "light") => {
+    await send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: touch });
+    await send("Emulation.setTouchEmulationEnabled", { enabled: touch });
+    await send("Emulation.setEmulatedMedia", { features: [{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: motion }] });
+  };
+  await size(width, height, touch, scheme);
   const evaluate = async expression => {
     const { result, exceptionDetails } = await send("Runtime.evaluate", { expression, awaitPromise: true, returnByValue: true });
     if (exceptionDetails) throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
@@ -125,5 +129,5 @@ export async function tab(browser, { width, height, touch = false, scheme = "lig
     await send("Runtime.addBinding", { name });
   };
   const close = () => browser.send("Target.closeTarget", { targetId });
-  return { send, evaluate, until, open, key, screenshot, before, binding, close, errors, loaded };
+  return { send, size, evaluate, until, open, key, screenshot, before, binding, close, errors, loaded };
 }

@@ -1,16 +1,14 @@
-// Tests of the page: node page.mjs INDEX.HTML MODULE.WASM REPLIES.JSONL FILES RECORDINGS CHROMIUM HOST:PORT
-// In the folder FILES is what can be dropped, RECORDINGS is a folder of recordings.
+// Tests of the page: node page.mjs INDEX.HTML MODULE.WASM REPLIES.JSONL CHROMIUM HOST:PORT
 // At HOST:PORT is the serial port of a probe. With TACTUS_PAGE_ONLY=PART those tests alone whose name has that part.
 import assert from "node:assert/strict";
-import { readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { Worker } from "node:worker_threads";
-import { crc32, deflateRawSync } from "node:zlib";
 import { launch, tab, within } from "./browser.mjs";
 import { serial } from "./serial.mjs";
 
-const [page, wasm, replies, files, recordings, chromium, probe] = process.argv.slice(2);
+const [page, wasm, replies, chromium, probe] = process.argv.slice(2);
 const url = hash => `${pathToFileURL(page)}${hash}`;
 const folder = dirname(page);
 const tests = [];
@@ -59,12 +57,12 @@ test("WebAssembly gives the native replies, byte by byte", async () => {
   return `${explorations} explorations`;
 });
 
-test("memory stays flat over 200 explorations", async () => {
+test("memory stays flat over 60 explorations", async () => {
   const { ask, memory } = module();
   ask('{"do":"world","world":1,"textures":20,"paper":false,"drift":1,"trial":1}');
   ask('{"do":"prepare"}');
   const sizes = [];
-  for (let n = 1; n <= 200; n++) {
+  for (let n = 1; n <= 60; n++) {
     ask(`{"do":"identify","texture":${n % 117 + 1},"seed":${n},"threshold":0.99,"false_alarm":0.02,"max_slides":3}`);
     let frames = 0;
     for (let frame = '"busy":true'; frame.includes('"busy":true');) {
@@ -73,7 +71,7 @@ test("memory stays flat over 200 explorations", async () => {
     }
     sizes.push(memory.buffer.byteLength);
   }
-  const [early, late] = [sizes[19], sizes[199]];
+  const [early, late] = [sizes[19], sizes[59]];
   assert.ok(late - early <= 65536, `${early} to ${late} bytes`);
   return `${(late / 2 ** 20).toFixed(1)} MB`;
 });
@@ -159,6 +157,7 @@ test("worn skin is told as changed, then as new, and the scale says the same", (
   const all = [];
   // the band between the two limits is narrow: for some textures a step of wear crosses it
   for (const place of [0, 3, 6, 9]) {
+    if (all.length > 1 && all.some(told => told.includes("changed"))) break;
     const told = [];
     await set(it, "wear", "0");
     await set(it, "texture", String((await it.evaluate(NOW)).known.numbers[place]));
@@ -247,96 +246,29 @@ test("a probe at a serial port: status, identify, teach, verify, log", () => usb
   const lines = log.trimEnd().split("\n").map(line => JSON.parse(line));
   assert.deepEqual(Object.keys(lines[0]), ["session"]);
   assert.ok(lines.some(({ report }) => report?.event?.Verdict), "no verdict in the log");
-  writeFileSync(join(folder, "session.jsonl"), log);
   return `${lines.length} lines of log`;
 }));
 
-test("a log is shown moment by moment", () => opened("", { motion: "reduce" }, async it => {
-  await press(it, "from-log");
-  const log = readFileSync(join(folder, "session.jsonl"), "utf8");
-  await it.evaluate(`(() => { const to = new DataTransfer(); to.items.add(new File([${JSON.stringify(log)}], "session.jsonl")); const e = document.getElementById("l-file"); e.files = to.files; e.dispatchEvent(new Event("change")); })()`);
-  await it.until("it is read", "document.querySelectorAll('#l-list button').length > 2", 20);
-  assert.match(await it.evaluate("document.querySelector('#l-list button').textContent"), /^Slide 1 chosen: /);
-  assert.match(await text(it, "why"), /Chosen for slide 1/);
-  assert.equal(await it.evaluate("document.querySelectorAll('#slides tr td').length"), 1);
-  await it.evaluate("document.querySelector('#l-list .verdict').click()");
-  assert.match(await text(it, "verdict"), /^(It is |It feels like |This is none|Not sure)/);
-  assert.ok((await it.evaluate(NOW)).slides >= 1);
-  // the verification, with its answer
-  await it.evaluate("document.querySelector('#l-list .judged').click()");
-  assert.match(await text(it, "doing"), /^slide 1, .*: score .*, different above/);
-  await it.evaluate("document.querySelector('#l-list .verified').click()");
-  assert.match(await text(it, "verdict"), /^(The same as my own cloth\.|Different from my own cloth|Not sure yet whether it is my own cloth)/);
-  assert.match(await text(it, "truth"), /^At this limit/);
-  await it.evaluate("document.querySelector('#l-list .verdict').click()");
-  assert.equal(await text(it, "doing"), "");
-  writeFileSync(join(folder, "screenshot-replayed-1280.png"), await it.screenshot(true));
-  await press(it, "l-back");
-  assert.doesNotMatch(await text(it, "verdict"), /^It is /);
-  await it.evaluate(`(() => { const to = new DataTransfer(); to.items.add(new File(["no log"], "a.jsonl")); const e = document.getElementById("l-file"); e.files = to.files; e.dispatchEvent(new Event("change")); })()`);
-  await it.until("it is refused", "!document.getElementById('l-problem').hidden", 20);
-  assert.match(await text(it, "l-problem"), /^A\.jsonl: line 1 is no line of a session's log/);
-}));
-
-// As a person drops them: files or folders of this machine.
-async function drop(it, ...paths) {
-  const data = { items: [], files: paths, dragOperationsMask: 1 };
-  for (const type of ["dragEnter", "dragOver", "drop"]) await it.send("Input.dispatchDragEvent", { type, x: 300, y: 300, data });
-}
-const read = (it, name) => it.until(`${name} is read`, `document.getElementById('l-say').textContent.startsWith(${JSON.stringify(`${name}: `)}) || !document.getElementById('l-problem').hidden`, 60);
-const labels = (it, kind) => it.evaluate(`[...document.querySelectorAll("#l-list .${kind}")].map(e => e.textContent)`);
-const looks = (it, kind, n = 0) => it.evaluate(`document.querySelectorAll("#l-list .${kind}")[${n}].click()`);
-const drawn = (it, id) => it.evaluate(`new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => { const c = document.getElementById("${id}"); if (!c.clientHeight) return done(false); const paper = new OffscreenCanvas(c.width, c.height).getContext("2d", { willReadFrequently: true }); paper.drawImage(c, 0, 0); done(paper.getImageData(0, 0, c.width, c.height).data.some(v => v > 0)); })))`);
-const shown = (it, id) => it.evaluate(`document.getElementById("${id}").getClientRects().length > 0`);
-
-test("recordings are shown slide by slide: a folder, and an MCAP file of it", () => opened("", { motion: "reduce" }, async it => {
-  const seen = [];
-  for (const [path, name] of [[recordings, "simulated"], [join(files, "recordings.mcap"), "recordings.mcap"]]) {
-    await drop(it, path);
-    await read(it, name);
-    assert.equal(await text(it, "l-problem"), "");
-    assert.equal((await it.evaluate(NOW)).source, "log");
-    assert.match(await text(it, "l-say"), /54 slides of 6 textures\..*not learned from it/);
-    assert.equal((await labels(it, "recorded")).length, 54);
-    await looks(it, "chosen");
-    assert.match(await text(it, "why"), /^It would choose for slide 1: /);
-    assert.equal(await it.evaluate("document.querySelectorAll('#benefit li').length"), 3);
-    await looks(it, "recorded", 1);
-    assert.equal(await text(it, "verdict"), "Recorded on Computer paper");
-    assert.match(await text(it, "features"), /^Features: traction \d\.\d\d N, roughness .* of its 12 bands: /);
-    for (const id of ["pac", "spectrum", "pdc", "shear"]) assert.ok(await drawn(it, id), id);
-    await looks(it, "slide", 1);
-    assert.equal((await it.evaluate(NOW)).slides, 2);
-    assert.equal(await it.evaluate("document.querySelectorAll('#map .slide').length"), 2);
-    await looks(it, "verdict");
-    assert.equal(await text(it, "truth"), "Recorded on Computer paper.");
-    assert.equal(await it.evaluate("document.querySelector('#posterior .name').textContent"), "Computer paper");
-    seen.push(await it.evaluate("[...document.querySelectorAll('#l-list button')].map(e => e.textContent).join('|')"));
-  }
-  assert.equal(seen[1], seen[0]);
-  return `${seen[0].split("|").length} moments`;
-}));
-
-test("new views have no clipped text, contrast AA and names, at 390 and 1280 px", async () => {
-  for (const [width, height] of [[360, 780], [390, 844], [1280, 900]]) {
+// The page as it is, at each of these sizes in light and dark: nothing is clipped, every text can be read.
+async function looksRight(it, widths, seen) {
+  for (const width of widths) {
+    const height = width < 500 ? 844 : 900;
     for (const scheme of ["light", "dark"]) {
-      await opened("", { width, height, touch: width < 500, motion: "reduce", scheme }, async it => {
-        await press(it, "from-log");
-        await drop(it, recordings);
-        await read(it, "simulated");
-        await looks(it, "slide", 2);
-        assert.ok(await drawn(it, "pac"));
-        assert.deepEqual(await it.evaluate(CLIPPED), [], `${width}`);
-        assert.deepEqual(await it.evaluate(CONTRAST), [], `${width} ${scheme}`);
-        assert.ok(await it.evaluate("document.documentElement.scrollWidth") <= width, `${width}`);
-        const { nodes } = await it.send("Accessibility.getFullAXTree");
-        const nameless = nodes.filter(node => !node.ignored && ["button", "slider", "image", "list"].includes(node.role?.value) && !node.name?.value);
-        assert.deepEqual(nameless.map(node => node.role.value), []);
-        writeFileSync(join(folder, `screenshot-recordings-${width}-${scheme}.png`), await it.screenshot(true));
-      });
+      await it.size(width, height, width < 500, scheme);
+      await new Promise(done => setTimeout(done, 250));
+      const at = `${width} ${scheme}`;
+      const wide = await it.evaluate("document.documentElement.scrollWidth");
+      assert.ok(wide <= width, `${wide} px in ${at}`);
+      assert.deepEqual(await it.evaluate(CLIPPED), [], at);
+      assert.deepEqual(await it.evaluate(CONTRAST), [], at);
+      if (width < 500) {
+        const small = await it.evaluate("[...document.querySelectorAll('button, select, input')].filter(e => e.offsetParent && e.offsetHeight < 36).map(e => e.id)");
+        assert.deepEqual(small, [], `too small for a finger: ${at}`);
+      }
+      await seen(width, scheme);
     }
   }
-});
+}
 
 test("the lens's caption lies on nothing, wherever the stage is", () => opened("", { motion: "reduce" }, async it => {
   const found = await it.evaluate(`(() => {
@@ -427,7 +359,6 @@ test("a probe at a serial port: stop, record, tables, and a plug that is pulled"
   const zip = files.get("cloth-2.zip");
   assert.equal(zip.readUInt32LE(0), 0x04034b50);
   assert.ok(zip.includes("cloth-2/manifest.csv") && zip.includes("cloth-2/t001_s002_pac.npy"));
-  writeFileSync(join(folder, "cloth-2.zip"), zip);
   const [table, bytes] = [...files].find(([name]) => name.endsWith(".tact"));
   assert.match(table, /^table-[0-9a-f]{8}\.tact$/);
   const push = content => it.evaluate(`(() => { const to = new DataTransfer(); to.items.add(new File([Uint8Array.from(${JSON.stringify([...content])})], "given.tact")); const e = document.getElementById("u-push"); e.files = to.files; e.dispatchEvent(new Event("change")); })()`);
@@ -440,61 +371,6 @@ test("a probe at a serial port: stop, record, tables, and a plug that is pulled"
   unplug();
   await it.until("it is told", "/closed the port; open it again/.test(document.getElementById('u-problem').textContent)", 20);
   assert.equal(await text(it, "u-connect"), "Connect a probe");
-}));
-
-// The files of a folder in a zip file, deflated: what people's programs make of it.
-function zipped(of) {
-  const parts = [], directory = [];
-  let at = 0;
-  for (const name of readdirSync(of)) {
-    const content = readFileSync(join(of, name)), packed = deflateRawSync(content), called = Buffer.from(`touched/${name}`);
-    const common = Buffer.alloc(26);
-    common.writeUInt16LE(20, 0); common.writeUInt16LE(8, 4); common.writeUInt32LE(crc32(content), 10);
-    common.writeUInt32LE(packed.length, 14); common.writeUInt32LE(content.length, 18); common.writeUInt16LE(called.length, 22);
-    const entry = Buffer.alloc(20);
-    entry.writeUInt16LE(20, 4); entry.writeUInt32LE(0x02014b50, 0);
-    const rest = Buffer.alloc(14);
-    rest.writeUInt32LE(at, 10);
-    directory.push(entry.subarray(0, 6), common, rest, called);
-    parts.push(Buffer.from([0x50, 0x4b, 3, 4]), common, called, packed);
-    at += 30 + called.length + packed.length;
-  }
-  const inside = Buffer.concat(directory), end = Buffer.alloc(22), files = readdirSync(of).length;
-  end.writeUInt32LE(0x06054b50, 0); end.writeUInt16LE(files, 8); end.writeUInt16LE(files, 10);
-  end.writeUInt32LE(inside.length, 12); end.writeUInt32LE(at, 16);
-  return Buffer.concat([...parts, inside, end]);
-}
-
-test("a zip file of the page's own recording, and an MCAP file of a session", () => opened("", { motion: "reduce" }, async it => {
-  await drop(it, join(folder, "cloth-2.zip"));
-  await read(it, "cloth-2.zip");
-  assert.match(await text(it, "l-say"), /2 slides of 1 texture\. A table is learned from two textures or more\. So the slides are judged with the table of the simulated world 1/);
-  assert.equal((await labels(it, "recorded")).length, 2);
-  assert.equal((await labels(it, "verdict")).length, 1);
-  const zip = zipped(recordings);
-  writeFileSync(join(folder, "deflated.zip"), zip);
-  writeFileSync(join(folder, "cut.zip"), zip.subarray(0, zip.length / 2));
-  const damaged = Buffer.from(zip);
-  damaged[zip.length >> 1] ^= 0x55;
-  writeFileSync(join(folder, "damaged.zip"), damaged);
-  await drop(it, join(folder, "deflated.zip"));
-  await read(it, "deflated.zip");
-  assert.equal((await labels(it, "recorded")).length, 54, await text(it, "l-problem"));
-  await drop(it, join(files, "session.mcap"));
-  await read(it, "session.mcap");
-  assert.match(await text(it, "l-say"), /1 exploration, 0 verifications/);
-  assert.equal((await labels(it, "recorded")).length, 0);
-  assert.equal(await shown(it, "pac"), false);
-  assert.ok((await labels(it, "chosen")).length >= 1);
-  await looks(it, "verdict");
-  assert.match(await text(it, "verdict"), /^(It is |It feels like |This is none|Not sure)/);
-  for (const [name, wanted] of [["theirs.mcap", /^Theirs\.mcap: its channels are not those of Tactus \(\/camera\): only what/], ["cut.mcap", /^Cut\.mcap: the MCAP file is cut off: copy it again/], ["no-manifest", /^No-manifest: neither manifest\.csv nor manifest\.json in this folder/], ["cut.zip", /^Cut\.zip: the zip file cannot be read \(its end is missing\): copy it again, or give the folder itself/], ["damaged.zip", /^Damaged\.zip: the zip file cannot be read \(/], ["some.txt", /^Some\.txt: neither a session's log/]]) {
-    await drop(it, join(name.endsWith(".zip") ? folder : files, name));
-    await it.until(`${name} is refused`, `!document.getElementById("l-problem").hidden && document.getElementById("l-problem").textContent.startsWith(${JSON.stringify(name[0].toUpperCase() + name.slice(1))})`, 20);
-    assert.match(await text(it, "l-problem"), wanted);
-  }
-  // what was open stays
-  assert.ok((await labels(it, "chosen")).length >= 1);
 }));
 
 test("without Web Serial it says which browsers have it", () => opened("", { motion: "reduce", before: it => it.before("delete Navigator.prototype.serial") }, async it => {
@@ -588,34 +464,17 @@ const CLIPPED = `[...document.querySelectorAll("body *")].filter(e => !e.closest
   .map(e => e.tagName + "#" + e.id + "." + e.className + " " + e.textContent.trim().slice(0, 40))`;
 
 test("no clipped text, and contrast AA, at every width in light and dark", async () => {
-  for (const [width, height] of [[390, 844], [1280, 900]]) {
-    for (const source of ["usb", "log"]) {
-      await opened("", { width, height, touch: width < 500, motion: "reduce", before: it => serial(it, probe) }, async it => {
-        await press(it, `from-${source}`);
-        assert.deepEqual(await it.evaluate(CLIPPED), [], `${width} ${source}`);
-        assert.deepEqual(await it.evaluate(CONTRAST), [], `${width} ${source}`);
-        assert.ok(await it.evaluate("document.documentElement.scrollWidth") <= width, `${width} ${source}`);
-        writeFileSync(join(folder, `screenshot-${source}-${width}.png`), await it.screenshot(true));
-      });
-    }
+  const shot = (it, name) => async (width, scheme) => writeFileSync(join(folder, `screenshot-${name}${width}-${scheme}.png`), await it.screenshot(true));
+  for (const source of ["usb"]) {
+    await opened("", { motion: "reduce", before: it => serial(it, probe) }, async it => {
+      await press(it, `from-${source}`);
+      await looksRight(it, [390, 1280], shot(it, `${source}-`));
+    });
   }
-  for (const width of WIDTHS) {
-    for (const scheme of ["light", "dark"]) {
-      await opened("#speed=max&x=40&seed=3", { width, height: width < 500 ? 844 : 900, touch: width < 500, scheme }, async it => {
-        await answered(it);
-        await new Promise(done => setTimeout(done, 250));
-        const wide = await it.evaluate("document.documentElement.scrollWidth");
-        assert.ok(wide <= width, `${wide} px in ${width}`);
-        assert.deepEqual(await it.evaluate(CLIPPED), [], `${width} ${scheme}`);
-        assert.deepEqual(await it.evaluate(CONTRAST), [], `${width} ${scheme}`);
-        if (width < 500) {
-          const small = await it.evaluate("[...document.querySelectorAll('button, select, input')].filter(e => e.offsetParent && e.offsetHeight < 36).map(e => e.id)");
-          assert.deepEqual(small, [], "too small for a finger");
-        }
-        writeFileSync(join(folder, `screenshot-${width}-${scheme}.png`), await it.screenshot(true));
-      });
-    }
-  }
+  await opened("#speed=max&x=40&seed=3", {}, async it => {
+    await answered(it);
+    await looksRight(it, WIDTHS, shot(it, ""));
+  });
 });
 
 /// Ends everything when the time is up, also while this thread computes without end.

@@ -17,7 +17,7 @@
   const ink = document.createElement("span");
   ink.hidden = true;
   document.body.append(ink);
-  const canvases = { pac: at("pac"), spectrum: at("spectrum"), pdc: at("pdc"), shear: at("shear"), ink };
+  const canvases = { pac: at("pac"), spectrum: at("spectrum"), pdc: at("pdc"), ink };
 
   // Numbers that are drawn from the seed: the same link shows the same.
   function draw() {
@@ -223,8 +223,7 @@
         if (slides === 0 && one.slide === 1) Places.clear();
         Mind.benefit(at("benefit"), known.movements, one.expected, one);
         Places.turn(one.movement);
-        at("why").textContent = `${one.would ? "It would choose" : "Chosen"} for slide ${one.slide}: ${Mind.movementName(known.movements[one.movement])}${one.property ? `, for ${one.property}` : ""}. It should take away the most doubt; each quarter of a bar is a factor of ten.`;
-        if (one.would) say("What it would choose before the next recorded slide");
+        at("why").textContent = `Chosen for slide ${one.slide}: ${Mind.movementName(known.movements[one.movement])}${one.property ? `, for ${one.property}` : ""}. It should take away the most doubt; each quarter of a bar is a factor of ten.`;
         break;
       case "look":
         stands(one.standing);
@@ -236,7 +235,6 @@
         Places.land(one.movement, one.place, false);
         if (slides === 0) at("slides").replaceChildren();
         slides += 1;
-        if (one.on) say(`Slide ${one.slide} is taken in`);
         const best = most(one.standing.posterior), m = one.measured;
         const early = one.early_ms ? `, ended after ${one.early_ms / 1000} s` : "";
         at("slides").append(cells([String(one.slide), Mind.movementName([m.force_n, m.speed_mm_s]) + early, fixed(m.traction_n, 2, " N"),
@@ -248,17 +246,6 @@
         Places.land(one.movement, one.place, false);
         at("moved").textContent = `Measured: traction ${fixed(m.traction_n, 2, " N")}, roughness ${fixed(m.roughness_ln, 2)}, fineness ${fixed(m.fineness_ln, 2)}. ${one.movement === null ? "The probe has learned nothing at this movement, so the map has no place for it." : "The ring in the map is this slide."}`;
         headline(["Measured by hand."]);
-        break;
-      }
-      case "recorded": {
-        const m = one.measured, value = (name, v, unit = "") => `${name} ${fixed(v, 2, unit)}`;
-        say(`Recorded: slide ${one.number}, ${Mind.movementName(one.movement)}`);
-        headline(["Recorded on ", { name: one.texture }]);
-        at("truth").textContent = "";
-        at("features").textContent = m ? `Features: ${value("traction", m.traction_n, " N")}, ${value("roughness", m.roughness_ln)}, ${value("fineness", m.fineness_ln)}. Logarithms of the power of its ${m.bands_ln.length} bands: ${m.bands_ln.map(v => v.toFixed(1)).join(", ")}.` : `It says nothing: ${one.why}.`;
-        if (known === null && m) {
-          at("slides").replaceChildren(cells([String(one.number), Mind.movementName(one.movement), fixed(m.traction_n, 2, " N"), fixed(m.roughness_ln, 2), fixed(m.fineness_ln, 2), "not judged"]));
-        }
         break;
       }
       case "judged":
@@ -314,8 +301,8 @@
     if (one.told === "new") headline([`This is none of those I know, ${of}.`], "new");
     if (one.told === "undecided") headline(["Not sure; most likely ", name, `, ${Mind.percent(one.probability)} ${of}.`]);
     if (source !== "sim") {
-      at("truth").textContent = one.on ? `Recorded on ${one.on}.` : "";
-      if (one.wants_label && source === "usb") at("u-name").value = one.told === "new" ? "" : one.texture;
+      at("truth").textContent = "";
+      if (one.wants_label) at("u-name").value = one.told === "new" ? "" : one.texture;
       return;
     }
     const truth = nameOf(asked.number);
@@ -537,7 +524,6 @@
         return;
       }
       forget();
-      if (source === "log") say("");
       document.body.dataset.told = "";
       verdict = null;
       Places.likely([]);
@@ -545,15 +531,6 @@
       headline(["What is this?"]);
     },
     happened,
-    // another file is open
-    opens: () => {
-      known = null;
-      document.body.dataset.blank = "";
-      at("features").textContent = "";
-    },
-    // recordings are shown, or a session is
-    records: are => { if (are) document.body.dataset.recorded = ""; else delete document.body.dataset.recorded; },
-    feels: streams => Traces.whole(streams),
     hears: frame => {
       Traces.take({ ...frame, pdc: [] });
       for (const one of frame.happened) happened(one);
@@ -566,7 +543,6 @@
     },
     fails: () => headline([FAILED]),
     ends: () => { if (source === "usb") headline(["No probe is connected."]); },
-    turn: to => turn(to),
   };
 
   async function turn(to) {
@@ -575,19 +551,18 @@
     busy = false; playing = false;
     source = to;
     document.body.dataset.source = to;
-    delete document.body.dataset.recorded;
     // nothing is known of a probe that is not there
     if (to === "sim") delete document.body.dataset.blank; else { document.body.dataset.blank = ""; at("figures").textContent = ""; known = null; }
-    for (const name of ["sim", "usb", "log"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
+    for (const name of ["sim", "usb"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
     forget();
     Places.likely([]);
     document.body.dataset.told = "";
     verdict = null;
     say("");
     if (to === "sim") return guarded(makeWorld);
-    headline([to === "usb" ? "No probe is connected." : "No file is open."]);
+    headline(["No probe is connected."]);
   }
-  for (const name of ["sim", "usb", "log"]) at(`from-${name}`).addEventListener("click", () => turn(name));
+  for (const name of ["sim", "usb"]) at(`from-${name}`).addEventListener("click", () => turn(name));
 
   // ---- the beginning
 
@@ -601,7 +576,6 @@
     await Probe.load();
     all = Probe.ask({ do: "textures" }).names;
     Usb.build(outside);
-    Replay.build(outside);
     await makeWorld();
     window.tactus.ready = performance.now() - began;
     before = performance.now();

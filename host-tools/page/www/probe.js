@@ -22,14 +22,8 @@ const Probe = (() => {
 
   // Asks for something, and gets what the core says. An error of the core is an Error with its sentence.
   const ask = request => to("ask", request);
-  // The same of a probe at a line, or of files.
+  // The same of a probe at a line.
   const remote = request => to("remote", request);
-
-  // A file, which a request of `remote` names then.
-  function give(bytes) {
-    write(bytes);
-    exports.give();
-  }
 
   function write(bytes) {
     const at = exports.request(bytes.length);
@@ -45,5 +39,5 @@ const Probe = (() => {
   }
 
   const bytes = () => exports.memory.buffer.byteLength;
-  return { load, ask, remote, give, bytes };
+  return { load, ask, remote, bytes };
 })();

@@ -1,12 +1,12 @@
 "use strict";
-// Traces that scroll, or those of a whole slide: vibration, its spectrum, pressure, friction.
+// Traces that scroll: vibration, its spectrum, pressure.
 const Traces = (() => {
   const PAC_HZ = 2200, PDC_HZ = 100;
   const PAC_S = 3, PDC_S = 30;
-  const pac = {}, pdc = {}, shear = {};
+  const pac = {}, pdc = {};
   // one spectrum every 64 samples
   const COLUMNS = Math.round(PAC_S * PAC_HZ / 64), ROWS = 64;
-  let spectra = [], columns = COLUMNS;
+  let spectra = [];
   let changed = true;
 
   function add(to, values) {
@@ -21,27 +21,15 @@ const Traces = (() => {
     add(pac, frame.pac);
     add(pdc, frame.pdc);
     spectra.push(...frame.spectra);
-    if (spectra.length > columns) spectra.splice(0, spectra.length - columns);
+    if (spectra.length > COLUMNS) spectra.splice(0, spectra.length - COLUMNS);
   }
 
   function clear() {
-    Object.assign(pac, { seconds: PAC_S, hz: PAC_HZ, values: [], mark: null });
-    Object.assign(pdc, { seconds: PDC_S, hz: PDC_HZ, values: [], mark: null });
-    Object.assign(shear, { seconds: PAC_S, hz: PAC_HZ, values: [], mark: null });
-    spectra = []; columns = COLUMNS; changed = true;
+    Object.assign(pac, { seconds: PAC_S, hz: PAC_HZ, values: [] });
+    Object.assign(pdc, { seconds: PDC_S, hz: PDC_HZ, values: [] });
+    spectra = []; changed = true;
   }
   clear();
-
-  // A slide that was recorded, from its first sample to its last; a line stands where the still finger's samples end.
-  function whole(slide) {
-    const trace = (to, values, hz, mark) => Object.assign(to, { seconds: Math.max(1, values.length) / hz, hz, values, mark });
-    trace(pac, slide.pac, PAC_HZ, slide.still || null);
-    trace(pdc, slide.pdc, slide.pdc_rate_hz, null);
-    trace(shear, slide.shear_mn, slide.shear_rate_hz, null);
-    spectra = slide.spectra;
-    columns = Math.max(1, spectra.length);
-    changed = true;
-  }
 
   // The drawing surface at the screen's own resolution.
   function surface(canvas) {
@@ -73,7 +61,6 @@ const Traces = (() => {
       if (least !== greatest) context.lineTo(x, y(least));
     }
     context.stroke();
-    if (trace.mark !== null) context.fillRect(trace.mark / perPixel, 0, ratio, tall);
     context.fillText(unit, 6 * ratio, 14 * ratio);
   }
 
@@ -88,17 +75,17 @@ const Traces = (() => {
   function heat(canvas, dark) {
     const { context, wide, high } = surface(canvas);
     if (!spectra.length) return;
-    const image = context.createImageData(columns, ROWS);
+    const image = context.createImageData(COLUMNS, ROWS);
     for (let n = 0; n < spectra.length; n++) {
-      const x = columns - spectra.length + n;
+      const x = COLUMNS - spectra.length + n;
       for (let row = 0; row < ROWS; row++) {
         const share = Math.min(1, Math.max(0, (spectra[n][row] + 8) / 48));
-        const at = ((ROWS - 1 - row) * columns + x) * 4;
+        const at = ((ROWS - 1 - row) * COLUMNS + x) * 4;
         const [r, g, b] = shade(share, dark);
         image.data[at] = r; image.data[at + 1] = g; image.data[at + 2] = b; image.data[at + 3] = 255 * Math.min(1, share * 3);
       }
     }
-    const small = new OffscreenCanvas(columns, ROWS);
+    const small = new OffscreenCanvas(COLUMNS, ROWS);
     small.getContext("2d").putImageData(image, 0, 0);
     context.imageSmoothingEnabled = false;
     context.drawImage(small, 0, 0, wide, high);
@@ -122,10 +109,8 @@ const Traces = (() => {
     line(canvases.pac, pac, touch, low, high, `\u00b1${Math.round((high - low) / 2)} counts`, soft);
     const [down, up] = range(pdc.values, 20);
     line(canvases.pdc, pdc, data, down, up, `${Math.round(down)} to ${Math.round(up)} counts`, soft);
-    const [least, most] = range(shear.values, 20);
-    line(canvases.shear, shear, data, least, most, shear.values.length ? `${Math.round(least)} to ${Math.round(most)} mN` : "not measured", soft);
     heat(canvases.spectrum, matchMedia("(prefers-color-scheme: dark)").matches);
   }
 
-  return { take, whole, clear, draw, again: () => { changed = true; } };
+  return { take, clear, draw, again: () => { changed = true; } };
 })();

@@ -7,7 +7,7 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{self, ExpectedOutcome};
-use tactus_core::features::{Property, PropertySet};
+use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::probe::explore::Random;
 use tactus_core::table::{Action, Table as Read};
 use tactus_lab::eval::evaluate::{MAX_TEXTURES, Method, explorer};
@@ -66,6 +66,15 @@ impl Inner {
             uncertainty: expected.map(|outcome| outcome.uncertainty),
             benefit: expected.map(|outcome| outcome.benefit),
         }
+    }
+
+    fn place(&self, wanted: Movement) -> PyResult<u8> {
+        let table = self.core.table();
+        let mut known = (0..).zip(table.movements());
+        let at = known.find_map(|(at, other)| (other == wanted).then_some(at));
+        at.ok_or_else(|| {
+            PyValueError::new_err(format!("the table does not have the movement {wanted}"))
+        })
     }
 
     fn answer(&self, verdict: explorer::Verdict) -> Answer {
@@ -173,13 +182,7 @@ impl Explorer {
     #[pyo3(signature = (slide, property=None))]
     fn update(&self, slide: &Features, property: Option<&str>) -> PyResult<()> {
         let mut inner = self.inner();
-        let table = inner.core.table();
-        let mut known = (0..).zip(table.movements());
-        let at = known.find_map(|(at, other)| (other == slide.movement).then_some(at));
-        let movement = at.ok_or_else(|| {
-            let say = format!("the table does not have the movement {}", slide.movement);
-            PyValueError::new_err(say)
-        })?;
+        let movement = inner.place(slide.movement)?;
         let chosen = inner.chosen.filter(|chosen| chosen.movement == movement);
         let property = match property {
             Some(name) => Some(self::property(name)?),
@@ -194,14 +197,8 @@ impl Explorer {
 
     /// Says that the movement (N, mm/s) came to nothing: it is chosen once more, then another one. False: none is left.
     fn reject(&self, force_n: f32, speed_mm_s: f32) -> PyResult<bool> {
-        let wanted = movement(force_n, speed_mm_s)?;
         let mut inner = self.inner();
-        let table = inner.core.table();
-        let mut known = (0..).zip(table.movements());
-        let at = known.find_map(|(at, other)| (other == wanted).then_some(at));
-        let movement = at.ok_or_else(|| {
-            PyValueError::new_err(format!("the table does not have the movement {wanted}"))
-        })?;
+        let movement = inner.place(movement(force_n, speed_mm_s)?)?;
         let property = inner.chosen.take().and_then(|chosen| chosen.property);
         Ok(inner.core.reject(Action { movement, property }))
     }

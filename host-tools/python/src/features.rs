@@ -129,12 +129,10 @@ pub(crate) fn plan() -> &'static Plan {
     PLAN.get_or_init(Plan::new)
 }
 
-/// A movement from newtons and millimetres per second.
 pub(crate) fn movement(force_n: f32, speed_mm_s: f32) -> PyResult<Movement> {
     Movement::from_si(force_n, speed_mm_s).map_err(|why| why.raise())
 }
 
-/// Samples that lie in one piece.
 fn samples<'a>(name: &str, array: &'a PyReadonlyArray1<'_, i16>) -> PyResult<&'a [i16]> {
     array.as_slice().map_err(|_| {
         PyValueError::new_err(format!(

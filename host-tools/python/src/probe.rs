@@ -244,20 +244,9 @@ fn name_of(name: &str) -> PyResult<Name> {
 
 /// "Busy", "Pressed", ..., or {"Slid": {"length_um": ..., "speed_um_s": ...}}, as on the link.
 fn state_of(state: &Bound<'_, PyAny>) -> PyResult<ArmState> {
-    if let Ok(slid) = state.get_item("Slid") {
-        return Ok(ArmState::Slid {
-            length_um: slid.get_item("length_um")?.extract()?,
-            speed_um_s: slid.get_item("speed_um_s")?.extract()?,
-        });
-    }
-    match state.extract::<String>()?.as_str() {
-        "Busy" => Ok(ArmState::Busy),
-        "Pressed" => Ok(ArmState::Pressed),
-        "Steady" => Ok(ArmState::Steady),
-        "Lifted" => Ok(ArmState::Lifted),
-        "Failed" => Ok(ArmState::Failed),
-        other => Err(PyValueError::new_err(format!("{other}: no arm's state"))),
-    }
+    let text = state.py().import("json")?.call_method1("dumps", (state,))?;
+    let state = serde_json::from_str(&text.extract::<String>()?);
+    state.map_err(|_| PyValueError::new_err(format!("{text}: no arm's state")))
 }
 
 #[pymethods]
@@ -488,7 +477,7 @@ fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
     let lines = py.detach(|| {
         let (mut lines, file) = (Vec::new(), File::open(&path)?);
         let read = log::read(file, |line| lines.push(line));
-        read.map_err(|why| why.raise_of(&path.display().to_string()))?;
+        read.map_err(|why| why.raise_of(path.display().to_string()))?;
         Ok::<_, PyErr>(lines)
     })?;
     let lines = lines.iter().map(|line| match line {

@@ -6,13 +6,12 @@ use std::sync::{Arc, OnceLock};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::{MeasureError, MeasuredSlide, measure, measure_all};
+use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all};
 
 use crate::error::Raise as _;
 use crate::features::{Features, plan};
@@ -33,10 +32,6 @@ pub(crate) struct Recordings {
 pub(crate) struct Slide {
     recording: Recording,
     texture: String,
-    pac: PyOnceLock<Py<PyArray1<i16>>>,
-    still: PyOnceLock<Py<PyArray1<i16>>>,
-    pdc: PyOnceLock<Py<PyArray1<i16>>>,
-    shear: PyOnceLock<Option<Py<PyArray1<i16>>>>,
 }
 
 impl Slide {
@@ -45,10 +40,6 @@ impl Slide {
         Self {
             recording,
             texture: texture.to_owned(),
-            pac: PyOnceLock::new(),
-            still: PyOnceLock::new(),
-            pdc: PyOnceLock::new(),
-            shear: PyOnceLock::new(),
         }
     }
 }
@@ -74,10 +65,10 @@ impl Recordings {
             let set = &self.set;
             let folder = set.folder().display();
             set.finger()
-                .map_err(|why| why.raise_of(&folder.to_string()))?;
+                .map_err(|why| why.raise_of(folder.to_string()))?;
             let all = work(py, |between| {
                 let all = measure_all(set, |_| between());
-                all.map_err(|why| Measuring(folder.to_string(), Box::new(why)))
+                all.map_err(|why| why.raise_of(format!("recordings in {folder}")))
             })?;
             // who was first is as good
             let _ = self.measured.set(all);
@@ -101,32 +92,6 @@ impl Recordings {
             let folder = self.set.folder().display();
             PyKeyError::new_err(format!("{wanted}: not in {folder}, which has: {known}"))
         })
-    }
-}
-
-/// Why a folder cannot be measured, with its name as the command line has it.
-#[derive(Debug)]
-struct Measuring(String, Box<MeasureError>);
-
-impl std::fmt::Display for Measuring {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "recordings in {}", self.0)
-    }
-}
-
-impl std::error::Error for Measuring {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        Some(&*self.1)
-    }
-}
-
-impl crate::error::Raise for Measuring {
-    fn raise(&self) -> PyErr {
-        self.with(crate::error::sentence(self))
-    }
-
-    fn with(&self, sentence: String) -> PyErr {
-        self.1.with(sentence)
     }
 }
 
@@ -167,31 +132,6 @@ impl Recordings {
     fn finger(&self) -> PyResult<(String, u32)> {
         let (finger, calibrated) = self.set.finger().map_err(|why| why.raise())?;
         Ok((finger.to_string(), calibrated))
-    }
-
-    /// What the manifest says of each slide, in its order: a list of dicts with material, name, slide, force_n, speed_mm_s, lot,
-    /// operator, note, moved, finger and calibrated. No sample is read.
-    fn manifest<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let mut all = Vec::new();
-        for (index, texture) in self.set.textures().iter().enumerate() {
-            for key in self.set.slides(index) {
-                let slide = PyDict::new(py);
-                let labels = &key.labels;
-                slide.set_item("material", texture.id)?;
-                slide.set_item("name", &texture.name)?;
-                slide.set_item("slide", key.number)?;
-                slide.set_item("force_n", key.movement.force_n())?;
-                slide.set_item("speed_mm_s", key.movement.speed_mm_s())?;
-                slide.set_item("lot", &labels.lot)?;
-                slide.set_item("operator", &labels.operator)?;
-                slide.set_item("note", &labels.note)?;
-                slide.set_item("moved", labels.moved)?;
-                slide.set_item("finger", labels.finger.to_string())?;
-                slide.set_item("calibrated", labels.calibrated)?;
-                all.push(slide);
-            }
-        }
-        Ok(all)
     }
 
     /// Reads the slides of a texture (its name or its number) with their samples, in the order of time: a list of `Slide`.
@@ -257,13 +197,16 @@ impl Recordings {
         let numbers = all.iter().map(|slide| slide.number).collect();
         columns.set_item("slide", array(py, numbers))?;
         columns.set_item("trial", array(py, trials))?;
-        columns.set_item("force_n", array(py, of(|s| s.movement.force_n())))?;
-        columns.set_item("speed_mm_s", array(py, of(|s| s.movement.speed_mm_s())))?;
-        columns.set_item("traction_n", array(py, property(Property::Traction)))?;
-        columns.set_item("roughness_ln", array(py, property(Property::Roughness)))?;
         columns.set_item("roughness_is_bound", array(py, bounds.collect()))?;
-        let fineness = array(py, property(Property::Fineness));
-        columns.set_item("fineness_unfiltered_ln", fineness)?;
+        for (name, values) in [
+            ("force_n", of(|s| s.movement.force_n())),
+            ("speed_mm_s", of(|s| s.movement.speed_mm_s())),
+            ("traction_n", property(Property::Traction)),
+            ("roughness_ln", property(Property::Roughness)),
+            ("fineness_unfiltered_ln", property(Property::Fineness)),
+        ] {
+            columns.set_item(name, array(py, values))?;
+        }
         columns.set_item("ln_psd_bands", rows(py, bands, BAND_EDGES.len() - 1)?)?;
         columns.set_item("ln_fused_bands", rows(py, fused.collect(), FUSED_BANDS)?)?;
         Ok(columns)
@@ -316,11 +259,10 @@ impl Slide {
         self.recording.window
     }
 
-    /// int16 of shape (samples,): P_AC in counts about the still baseline. Read-only, and made once.
+    /// int16 of shape (samples,): P_AC in counts about the still baseline. Read-only.
     #[getter]
-    fn pac(&self, py: Python<'_>) -> Py<PyArray1<i16>> {
-        let made = || array(py, self.recording.pac()).unbind();
-        self.pac.get_or_init(py, made).clone_ref(py)
+    fn pac<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i16>> {
+        array(py, self.recording.pac())
     }
 
     /// Rate of `pac` and `still`: 2200 Hz.
@@ -331,9 +273,8 @@ impl Slide {
 
     /// int16 of shape (samples,): P_AC of the finger at rest, in counts; empty where its power is known.
     #[getter]
-    fn still(&self, py: Python<'_>) -> Py<PyArray1<i16>> {
-        let made = || array(py, self.recording.still()).unbind();
-        self.still.get_or_init(py, made).clone_ref(py)
+    fn still<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i16>> {
+        array(py, self.recording.still())
     }
 
     /// Power of the still finger, counts^2, where its samples were not recorded; else None.
@@ -344,9 +285,8 @@ impl Slide {
 
     /// int16 of shape (samples,): P_DC in counts about the still baseline.
     #[getter]
-    fn pdc(&self, py: Python<'_>) -> Py<PyArray1<i16>> {
-        let made = || array(py, self.recording.pdc.clone()).unbind();
-        self.pdc.get_or_init(py, made).clone_ref(py)
+    fn pdc<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i16>> {
+        array(py, self.recording.pdc.clone())
     }
 
     /// Rate of `pdc`, Hz.
@@ -357,10 +297,8 @@ impl Slide {
 
     /// int16 of shape (samples,): tangential force in mN; None where the rig cannot measure it.
     #[getter]
-    fn shear_mn(&self, py: Python<'_>) -> Option<Py<PyArray1<i16>>> {
-        let made = || Some(array(py, self.recording.shear_mn()?).unbind());
-        let shear = self.shear.get_or_init(py, made).as_ref();
-        shear.map(|shear| shear.clone_ref(py))
+    fn shear_mn<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<i16>>> {
+        Some(array(py, self.recording.shear_mn()?))
     }
 
     /// Rate of `shear_mn`, Hz.

@@ -1,23 +1,17 @@
 //! The simulated world: a rig and a hand that slide over textures of Table 1.
 
-use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tactus_core::sensor::FingerName;
-use tactus_lab::data::recording::Recording;
-use tactus_lab::data::recordings::RecordingError;
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name, texture_number};
-use tactus_lab::sim::handheld::learn_with;
 use tactus_lab::sim::rig::SimRig;
 use tactus_world::textures::TEXTURES;
 
-use crate::error::Raise as _;
 use crate::features::movement;
 use crate::recordings::Slide;
-use crate::table::Table;
 use crate::work::work;
 
 /// A simulated rig with a texture under its finger.
@@ -129,20 +123,17 @@ impl SimulatedRig {
 /// `tactus simulate` writes.
 ///
 /// textures: names in Table 1 or numbers; all 117, unless given. trials: of each texture at each of the study's three movements.
-/// seed: the world. finger: "biotac", "analog" or "mems". folder: a new folder to write them to, too, byte for byte as
-/// `tactus simulate --out` does; `Recordings` opens it.
+/// seed: the world. finger: "biotac", "analog" or "mems".
 ///
-/// Raises KeyError for a texture that Table 1 does not have, RecordingError where the folder cannot be written or holds other
-/// recordings, SimulationError for a fault of the rig, KeyboardInterrupt after Ctrl-C.
+/// Raises KeyError for a texture that Table 1 does not have, SimulationError for a fault of the rig, KeyboardInterrupt after Ctrl-C.
 #[pyfunction]
-#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac", folder=None))]
+#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
 fn simulate<'py>(
     py: Python<'py>,
     textures: Option<Vec<String>>,
     trials: u32,
     seed: u64,
     finger: &str,
-    folder: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
     let first = collection.textures[0];
@@ -150,24 +141,6 @@ fn simulate<'py>(
     let recorded = work(py, |between| {
         collection.record_with(finger, calibration, between)
     })?;
-    if let Some(folder) = folder {
-        py.detach(|| -> Result<(), RecordingError> {
-            let mut writer = collection.writer(&folder, finger)?;
-            for (texture, slides) in recorded.iter().enumerate() {
-                for slide in slides {
-                    if !writer.has(texture, slide.number) {
-                        let slide = Recording {
-                            texture,
-                            ..slide.clone()
-                        };
-                        writer.write(&slide)?;
-                    }
-                }
-            }
-            writer.finish()
-        })
-        .map_err(|why| why.raise())?;
-    }
     let all = PyDict::new(py);
     for (slides, &number) in recorded.into_iter().zip(&collection.textures) {
         let name = texture_name(number);
@@ -177,29 +150,9 @@ fn simulate<'py>(
     Ok(all)
 }
 
-/// Learns a handheld probe's table from slides of a simulated hand, as `tactus learn-by-hand` does, byte for byte: the `Table`,
-/// and the names of textures without enough good slides, which are not in it.
-///
-/// Arguments and errors as of `simulate`; trials: slides of each texture.
-#[pyfunction]
-#[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
-fn learn_by_hand(
-    py: Python<'_>,
-    textures: Option<Vec<String>>,
-    trials: u32,
-    seed: u64,
-    finger: &str,
-) -> PyResult<(Table, Vec<&'static str>)> {
-    let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
-    let (bytes, left_out) = work(py, |between| learn_with(finger, &collection, between))?;
-    let left_out = left_out.into_iter().map(texture_name).collect();
-    Ok((Table::of(bytes)?, left_out))
-}
-
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let names: Vec<&str> = TEXTURES.iter().map(|texture| texture.name).collect();
     module.add("TEXTURES", names)?;
     module.add_class::<SimulatedRig>()?;
-    module.add_function(wrap_pyfunction!(simulate, module)?)?;
-    module.add_function(wrap_pyfunction!(learn_by_hand, module)?)
+    module.add_function(wrap_pyfunction!(simulate, module)?)
 }

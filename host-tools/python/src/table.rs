@@ -118,13 +118,7 @@ impl Table {
             let texture = texture.clone();
             let row: Vec<_> = movements.iter().map(|&m| of(slides, m)).collect();
             if let Some((few, &movement)) = row.iter().zip(&movements).find(|(s, _)| s.len() < 2) {
-                let there = few.len();
-                return Err(FirstError::Few {
-                    texture,
-                    movement,
-                    there,
-                }
-                .raise());
+                return Err(FirstError::few(&texture, movement, few.len()).raise());
             }
             observed.push(row);
         }
@@ -155,7 +149,7 @@ impl Table {
         Ok(write_whole(&path, &self.bytes)?)
     }
 
-    /// What `tactus table show --format json` prints, as a dict: movements, textures, and what is known of each.
+    /// What `tactus table FILE --format json` prints, as a dict: movements, textures, and what is known of each.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         object(py, &TableSummary::new(self.read()?))
     }

@@ -52,11 +52,6 @@ def biotac():
 
 
 @pytest.fixture(scope="session")
-def worlds():
-    return data("worlds")
-
-
-@pytest.fixture(scope="session")
 def command():
     """Runs the command `tactus`: what it prints, or its complaint."""
     name = os.environ.get("TACTUS_COMMAND", ROOT / "target/debug/tactus")

@@ -31,15 +31,15 @@ def test_a_table_is_the_commands_byte_for_byte(whose, ours, theirs, request, com
     table.save(tmp_path / "ours")
     read = tactus.Table.load(tmp_path / "ours")
     assert bytes(read) == bytes(tactus.Table.from_bytes(bytes(table))) == bytes(table)
-    assert read.summary() == json.loads(command("table", "show", out, "--format", "json"))
+    assert read.summary() == json.loads(command("table", out, "--format", "json"))
     assert len(read) == len(recordings.textures) and read.textures == recordings.textures
     assert read.method == ("student-all" if ours.get("method") else "fused")
-    assert f"checksum {read.checksum}" in command("table", "check", out)
+    assert f"checksum {read.checksum}" in command("table", out)
 
 
 def test_errors_of_tables_are_the_commands(small, command, tmp_path):
     file = tmp_path / "table"
-    said = lambda: command("table", "check", file)
+    said = lambda: command("table", file)
     for bytes_ in None, b"none", bytes(tactus.Table.learn(small)) + b"more":
         if bytes_ is not None:
             file.write_bytes(bytes_)
@@ -72,26 +72,10 @@ def test_evaluations_are_the_commands_to_the_digit(whose, ours, theirs, request,
     assert tactus.evaluate(recordings, runs=500, **ours) == json.loads(command(*at))
 
 
-def test_novelty_and_verification_are_the_commands(biotac, command):
-    at = ["evaluate", "--recordings", biotac.folder, "--format", "json", "--runs", 200]
-    about = ["method", "protocol", "train_slides", "runs", "seed", "left_out"]
-    figures = lambda *more: {k: v for k, v in json.loads(command(*at, *more)).items() if k not in about}
-    assert tactus.novelty(biotac, 2, runs=200) == figures("--novelty", "leave-one-out", "--left-out", 2)
-    assert tactus.evaluate_verify(biotac, runs=200) == figures("--verify")
-
-
-def test_properties_of_others_are_evaluated_as_by_the_command(worlds, command):
-    file = worlds / "world_1.csv"
-    said = json.loads(command("evaluate", "--properties", file, "--method", "paper", "--runs", 500, "--format", "json"))
-    assert tactus.evaluate(tactus.Properties(file), method="paper", runs=500) == said
-
-
 def test_what_cannot_be_evaluated_says_so(small, command):
     with pytest.raises(tactus.TactusError) as why:
         tactus.evaluate(small, train_slides=50)
     assert str(why.value) == command("evaluate", "--recordings", small.folder, "--train-slides", 50)
-    with pytest.raises(ValueError, match="fused"):
-        tactus.novelty(small, method="paper", train_slides=2)
     with pytest.raises(TypeError, match="slides"):
         tactus.evaluate(small, slides=3)
     with pytest.raises(ValueError, match="threshold"):

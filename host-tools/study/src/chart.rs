@@ -26,7 +26,6 @@ pub(crate) enum Mark {
 /// The marks in the order in which series take them: the colour alone is not enough for every eye.
 pub(crate) const MARKS: [Mark; 4] = [Mark::Circle, Mark::Triangle, Mark::Square, Mark::Cross];
 
-/// Points of one kind.
 pub(crate) struct Series {
     /// Written at the last point, or in the legend; empty for none.
     pub(crate) name: String,
@@ -34,11 +33,8 @@ pub(crate) struct Series {
     pub(crate) mark: Mark,
     /// The line that joins them, if any; dashed if they are only there for comparison.
     pub(crate) line: Option<Line>,
-    /// Of the line, px.
     pub(crate) width: u32,
     pub(crate) points: Vec<(f64, f64)>,
-    /// Lower and upper end of each point's error bar; none where it is empty.
-    pub(crate) bars: Vec<(f64, f64)>,
     /// Written beside each point where there is room; nothing where it is empty.
     pub(crate) labels: Vec<String>,
     /// Tooltip of each point; empty for none.
@@ -66,7 +62,6 @@ impl Series {
             line: None,
             width: 2,
             points,
-            bars: Vec::new(),
             labels: Vec::new(),
             says: Vec::new(),
         }
@@ -95,11 +90,8 @@ impl Series {
     }
 }
 
-/// A chart.
 pub(crate) struct Chart<'a> {
     pub(crate) title: String,
-    /// True if the title is written above it, too.
-    pub(crate) titled: bool,
     /// Its description, for those who cannot see it; empty if the title says it.
     pub(crate) about: String,
     /// Quantity of an axis, with its unit.
@@ -110,21 +102,14 @@ pub(crate) struct Chart<'a> {
     /// Number of marks on the x axis, and their labels.
     pub(crate) x_marks: usize,
     pub(crate) x_text: &'a dyn Fn(f64) -> String,
-    /// Number of marks on the y axis.
-    pub(crate) y_marks: usize,
-    /// A part of the x axis that is shaded, and the reason.
-    pub(crate) span: Option<((f64, f64), &'a str)>,
-    /// Names at the ends of the lines rather than in a legend.
-    pub(crate) named_at_end: bool,
-    /// Words below it.
     pub(crate) below: &'a str,
     /// px
     pub(crate) size: (u32, u32),
     pub(crate) series: Vec<Series>,
 }
 
-/// Of one panel, px.
-pub(crate) const PANEL: (u32, u32) = (WIDTH, 350);
+/// Size of a chart that asks for none, px.
+const PANEL: (u32, u32) = (WIDTH, 350);
 /// Height of a line of words, px.
 const LINE: i32 = TEXT as i32 + 2;
 
@@ -142,7 +127,6 @@ pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (low - buffer, high + buffer)
 }
 
-/// A number for an axis.
 fn plain(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
     format!("{}", rounded + 0.0)
@@ -157,22 +141,16 @@ impl<'a> Chart<'a> {
         x_range: (f64, f64),
         series: Vec<Series>,
     ) -> Self {
-        let bars = series.iter().flat_map(|s| &s.bars);
-        let bars = bars.flat_map(|&(low, high)| [low, high]);
         let points = series.iter().flat_map(|s| &s.points).map(|p| p.1);
         Self {
             title: title.into(),
-            titled: true,
             about: String::new(),
             x,
             y,
             x_range,
-            y_range: buffer(points.chain(bars)),
+            y_range: buffer(points),
             x_marks: 6,
             x_text: &plain,
-            y_marks: 6,
-            span: None,
-            named_at_end: false,
             below: "",
             size: PANEL,
             series,
@@ -197,18 +175,8 @@ impl<'a> Chart<'a> {
     /// Draws it; returns the area between the axes, and the tooltips of its points.
     fn draw(&self, root: &Root<'_>) -> Result<(Area, Vec<Tip>), Failed> {
         let (full, tall) = (self.size.0 as i32, self.size.1 as i32);
-        let mut top = match self.titled {
-            true => caption(root, &self.title, self.size.0)? as i32,
-            false => 4,
-        };
-        if !self.named_at_end {
-            top = self.legend(root, top)?;
-        }
-        let names = self.series.iter().map(|s| width(&s.name, EM));
-        let right = match names.max() {
-            Some(longest) if self.named_at_end => longest + 30,
-            _ => 16,
-        };
+        let title = caption(root, &self.title, self.size.0)? as i32;
+        let top = self.legend(root, title)?;
         let below = lines(self.below, EM, full - 16);
         let below: Vec<&String> = below.iter().filter(|line| !line.is_empty()).collect();
         let under = LINE * below.len() as i32;
@@ -221,7 +189,7 @@ impl<'a> Chart<'a> {
         let mut on = ChartBuilder::on(root);
         on.margin(6)
             .margin_top(top)
-            .margin_right(right)
+            .margin_right(16)
             .margin_bottom(6 + under)
             .x_label_area_size(if self.x.is_empty() { 24 } else { 48 })
             .y_label_area_size(70);
@@ -232,7 +200,7 @@ impl<'a> Chart<'a> {
         mesh.x_desc(self.x)
             .y_desc(self.y)
             .x_labels(self.x_marks)
-            .y_labels(self.y_marks)
+            .y_labels(6)
             .x_label_formatter(&x_text)
             .y_label_formatter(&y_text)
             .light_line_style(TRANSPARENT)
@@ -243,10 +211,6 @@ impl<'a> Chart<'a> {
             mesh.disable_mesh();
         }
         mesh.draw()?;
-        if let Some(((from, to), _)) = self.span {
-            let corners = [(from, y_range.0), (to, y_range.1)];
-            drawn.draw_series([Rectangle::new(corners, SPAN.mix(SPAN_SHADE).filled())])?;
-        }
         for series in &self.series {
             let style = series.colour.stroke_width(series.width);
             match series.line {
@@ -260,16 +224,13 @@ impl<'a> Chart<'a> {
                 }
                 None => {}
             }
-            let bars = series.points.iter().zip(&series.bars);
-            let bars = bars.map(|(&(x, _), &(low, high))| vec![(x, low), (x, high)]);
-            drawn.draw_series(bars.map(|bar| PathElement::new(bar, style)))?;
         }
         let area = drawn.plotting_area();
         let (x, y) = (area.get_x_axis_pixel_range(), area.get_y_axis_pixel_range());
         let [left, right] = [x.start.min(x.end), x.start.max(x.end)];
         let [top, bottom] = [y.start.min(y.end), y.start.max(y.end)];
         let mut tips = Vec::new();
-        let (mut ends, mut points, mut labels): (Vec<i32>, Vec<_>, Vec<_>) = Default::default();
+        let (mut points, mut labels): (Vec<_>, Vec<_>) = Default::default();
         for series in &self.series {
             let at: Vec<(i32, i32)> = series
                 .points
@@ -285,21 +246,9 @@ impl<'a> Chart<'a> {
             }));
             points.extend(at.iter().zip(&series.labels).map(|(at, _)| *at));
             labels.extend(series.labels.iter().cloned());
-            if let (true, false, Some(&(x, mut y))) =
-                (self.named_at_end, series.name.is_empty(), at.last())
-            {
-                // names cover neither each other nor the words below the axis
-                let away = if y > (top + bottom) / 2 { -1 } else { 1 };
-                while ends.iter().any(|other| (other - y).abs() < LINE - 3) {
-                    y += away;
-                }
-                ends.push(y);
-                mark(root, series, (x + 13, y))?;
-                write(root, &series.name, (x + 21, y), From::Left, BLACK)?;
-            }
         }
         let inside = [left + 2, top + 2, right - 2, bottom - 2];
-        let placed = place(&points, &labels, EM, inside, &[]);
+        let placed = place(&points, &labels, EM, inside);
         for ((at, label), middle) in points.iter().zip(&labels).zip(placed) {
             let Some((x, y)) = middle else { continue };
             let half = width(label, EM) / 2;
@@ -340,13 +289,6 @@ impl<'a> Chart<'a> {
             write(root, &series.name, (x + SIGN, y), From::Left, BLACK)?;
             is_empty = false;
         }
-        if let Some((_, name)) = self.span.filter(|(_, name)| !name.is_empty()) {
-            let (x, y) = next(name);
-            let corners = [(x, y - 6), (x + 24, y + 6)];
-            root.draw(&Rectangle::new(corners, SPAN.mix(SPAN_SHADE).filled()))?;
-            write(root, name, (x + SIGN, y), From::Left, BLACK)?;
-            is_empty = false;
-        }
         Ok(if is_empty { top } else { y + LINE - 6 })
     }
 
@@ -365,11 +307,6 @@ impl<'a> Chart<'a> {
     }
 }
 
-/// Colour of a part of an axis, and its opacity.
-const SPAN: RGBColor = COLOURS[4];
-const SPAN_SHADE: f64 = 0.25;
-
-/// Draws the mark of a series.
 fn mark(root: &Root<'_>, series: &Series, at: (i32, i32)) -> Result<(), Failed> {
     let filled = series.colour.filled();
     match series.mark {

@@ -9,14 +9,6 @@ use tactus_lab::sim::rig::SimError;
 /// Reasons why a study fails.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A stage of the study failed.
-    #[error("{stage}")]
-    Stage {
-        /// Its name.
-        stage: &'static str,
-        /// The reason.
-        source: Box<StudyError>,
-    },
     /// The rig of a world fails before the first texture.
     #[error(
         "world {world}: the simulated rig cannot be calibrated; another --seed makes another world"
@@ -39,15 +31,4 @@ pub enum StudyError {
     /// Explorations failed.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
-}
-
-impl StudyError {
-    /// The same, with the stage of the study.
-    #[must_use]
-    pub fn in_stage(self, stage: &'static str) -> Self {
-        Self::Stage {
-            stage,
-            source: Box::new(self),
-        }
-    }
 }

@@ -1,18 +1,14 @@
 //! Identification among all textures (Table 5), and discrimination of pairs (Table 4): thousands of virtual
 //! explorations, each slide drawn from the validation trials.
 
-use serde::{Deserialize, Serialize};
-use tactus_core::explorer::{Config, Explorer};
-use tactus_core::features::Property;
+use serde::Serialize;
+use tactus_core::explorer::Config;
 
 use super::error::StudyError;
 use super::published::{IDENTIFIED, PAIRS};
-use super::slides::{Named, Recorded, StudyWorld};
-use tactus_lab::eval::evaluate::{
-    MAX_TEXTURES, Method, Outcome, Summary, evaluate, explorer, play_with,
-};
+use super::slides::{Named, Recorded};
+use tactus_lab::eval::evaluate::{Method, Outcome, Summary, evaluate};
 use tactus_lab::eval::experiment::Experiment;
-use tactus_lab::eval::verdicts::Verdicts;
 use tactus_lab::sim::collection::{Collection, texture_name};
 
 /// The ways of exploring that are compared, the paper's three and the project's own.
@@ -33,7 +29,7 @@ pub const MAX_SLIDES: u8 = 10;
 const MAX_PAIR_SLIDES: u8 = 254;
 
 /// Results of a way of exploring: a column of Table 5.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Column {
     /// Right answers, %.
     pub correct: f64,
@@ -92,12 +88,12 @@ fn config(method: Method) -> Config {
 ///
 /// # Errors
 /// See [`StudyError`].
-pub fn identify(
+fn identify(
     experiment: &Experiment,
     method: Method,
     simulations: u64,
     done: impl Fn() + Sync,
-) -> Result<(Column, Vec<Outcome>), StudyError> {
+) -> Result<Column, StudyError> {
     let outcomes = evaluate(experiment, config(method), simulations, done)?;
     let summary = Summary::new(&outcomes, experiment.names(), MAX_SLIDES);
     let right = |o: &&Outcome| o.identified == o.unknown;
@@ -108,7 +104,7 @@ pub fn identify(
             .collect();
         percent(of.iter().copied().filter(right).count(), of.len())
     });
-    let column = Column {
+    Ok(Column {
         correct: 100.0 * summary.accuracy,
         converged: percent(
             outcomes.iter().filter(right).filter(|o| o.sure).count(),
@@ -118,12 +114,11 @@ pub fn identify(
         median: summary.median_slides,
         mean: summary.mean_slides,
         textures: textures.collect(),
-    };
-    Ok((column, outcomes))
+    })
 }
 
 /// A row of Table 4.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PairRow {
     /// The textures.
     pub textures: [Named; 2],
@@ -172,78 +167,26 @@ pub fn pairs(
     PAIRS.iter().map(row).collect()
 }
 
+/// Mean of the right answers, %.
+pub fn pairs_mean(rows: &[PairRow]) -> f64 {
+    rows.iter().map(|row| row.correct).sum::<f64>() / rows.len().max(1) as f64
+}
+
 /// Share in %; of nothing, 0.
-pub(super) fn percent(part: usize, of: usize) -> f64 {
+fn percent(part: usize, of: usize) -> f64 {
     100.0 * part as f64 / of.max(1) as f64
 }
 
 /// Identification in one world: Table 5.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Identification {
     /// Virtual explorations of each way of exploring.
     pub simulations: u64,
     /// The textures, in the order of Table 5.
     pub textures: Vec<Named>,
-    /// The cycle of cycling: the best movement of each property.
-    pub cycled: Vec<(usize, Property)>,
     /// The ways of exploring, as [`METHODS`].
     pub columns: Vec<Column>,
-    /// Verdicts, by each way of exploring.
-    pub told: Vec<ToldColumn>,
-    /// Explorations by Bayesian exploration, as in fig. 10.
-    pub evolutions: Vec<Evolution>,
 }
-
-/// Shares of the verdicts: `tactus identify` allows for an unknown texture, and no slide counts twice.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub struct ToldColumn {
-    /// Shares of the explorations.
-    pub verdicts: Verdicts,
-    /// Mean number of movements.
-    pub mean: f64,
-}
-
-impl ToldColumn {
-    fn run(
-        experiment: &Experiment,
-        method: Method,
-        simulations: u64,
-        done: impl Fn() + Sync,
-    ) -> Result<Self, StudyError> {
-        let config = Config {
-            open: true,
-            ..config(method)
-        };
-        let experiment = experiment.clone().each_slide_once();
-        let outcomes = evaluate(&experiment, config, simulations, done)?;
-        Ok(Self {
-            verdicts: Verdicts::of(outcomes.iter().map(Outcome::told)),
-            mean: Summary::new(&outcomes, experiment.names(), MAX_SLIDES).mean_slides,
-        })
-    }
-}
-
-/// One exploration, step by step.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Evolution {
-    /// The kind that it is an example of.
-    pub example: String,
-    /// Number of the simulation.
-    pub simulation: u64,
-    /// The unknown texture.
-    pub unknown: Named,
-    /// The answer.
-    pub identified: Named,
-    /// True if it reached 99 %.
-    pub sure: bool,
-    /// Movement (from 0) and property of each step.
-    pub steps: Vec<(u8, Property)>,
-    /// Textures that were ever likely, with their probability before the first step and after each.
-    pub probabilities: Vec<(Named, Vec<f32>)>,
-}
-
-/// Textures that are always less probable than this are not shown.
-const LIKELY: f32 = 0.1;
 
 impl Identification {
     /// Explores by every way.
@@ -255,145 +198,26 @@ impl Identification {
         simulations: u64,
         done: impl Fn() + Sync,
     ) -> Result<Self, StudyError> {
-        let (mut columns, mut told) = (Vec::new(), Vec::new());
-        let mut evolutions = Vec::new();
-        let mut cycled = Vec::new();
-        for method in METHODS {
-            let (column, outcomes) = identify(experiment, method, simulations, &done)?;
-            columns.push(column);
-            told.push(ToldColumn::run(experiment, method, simulations, &done)?);
-            if method == Method::Paper {
-                let bytes = experiment.run(0).learn(method.method())?;
-                let mut explorer = explorer(&bytes, experiment.measured(), config(method), None)?;
-                cycled = explorer
-                    .turns()
-                    .filter_map(|a| Some((usize::from(a.movement), a.property?)))
-                    .collect();
-                evolutions = examples(&outcomes)
-                    .into_iter()
-                    .map(|(example, n)| evolution(experiment, &mut explorer, example, n))
-                    .collect();
-            }
-        }
+        let columns = METHODS
+            .iter()
+            .map(|&method| identify(experiment, method, simulations, &done))
+            .collect::<Result<_, _>>()?;
         Ok(Self {
             simulations,
             textures: IDENTIFIED.map(Named::new).to_vec(),
-            cycled,
             columns,
-            told,
-            evolutions,
         })
     }
 
     /// Explorations of [`Identification::run`], for a progress bar.
     pub fn explorations(simulations: u64) -> u64 {
-        2 * METHODS.len() as u64 * simulations
+        METHODS.len() as u64 * simulations
     }
 
     /// The column of a way of exploring.
     pub fn column(&self, method: Method) -> Option<&Column> {
         let at = METHODS.iter().position(|m| *m == method)?;
         self.columns.get(at)
-    }
-}
-
-/// The first simulations of the four kinds that fig. 10 shows.
-fn examples(outcomes: &[Outcome]) -> Vec<(&'static str, u64)> {
-    fn right(o: &Outcome) -> bool {
-        o.identified == o.unknown
-    }
-    type Is = fn(&Outcome) -> bool;
-    let kinds: [(&str, Is); 4] = [
-        ("identified at once", |o| {
-            right(o) && o.sure && o.slides <= 3
-        }),
-        ("identified late", |o| right(o) && o.sure && o.slides >= 6),
-        ("taken for another", |o| !right(o)),
-        ("right, but not sure after 10 movements", |o| {
-            right(o) && !o.sure
-        }),
-    ];
-    let first =
-        |(example, is): (&'static str, Is)| Some((example, outcomes.iter().position(is)? as u64));
-    kinds.into_iter().filter_map(first).collect()
-}
-
-/// Plays a simulation again, and keeps the posterior at each step.
-fn evolution(
-    experiment: &Experiment,
-    explorer: &mut Explorer<'_, MAX_TEXTURES>,
-    example: &'static str,
-    simulation: u64,
-) -> Evolution {
-    let run = experiment.run(simulation);
-    let mut steps = Vec::new();
-    let mut posteriors = vec![vec![
-        1.0 / experiment.names().len() as f32;
-        experiment.names().len()
-    ]];
-    let outcome = play_with(
-        explorer,
-        None,
-        Method::Paper.strategy(),
-        run,
-        |action, explorer| {
-            steps.extend(action.property.map(|property| (action.movement, property)));
-            posteriors.push(explorer.posterior().to_vec());
-        },
-    );
-    let named = |index: usize| Named::new(index as u8 + 1);
-    let of = |texture: usize| posteriors.iter().map(move |p| p[texture]);
-    let likely = (0..experiment.names().len())
-        .filter(|&texture| of(texture).any(|p| p >= LIKELY) || texture == outcome.unknown);
-    Evolution {
-        example: example.to_owned(),
-        simulation,
-        unknown: named(outcome.unknown),
-        identified: named(outcome.identified),
-        sure: outcome.sure,
-        steps,
-        probabilities: likely.map(|t| (named(t), of(t).collect())).collect(),
-    }
-}
-
-/// The results in one of several worlds.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct WorldRow {
-    /// The world.
-    pub seed: u64,
-    /// The ways of exploring, as [`METHODS`].
-    pub columns: Vec<Column>,
-    /// Mean of the pairs' right answers, %.
-    pub pairs: f64,
-}
-
-impl WorldRow {
-    /// Identification and pairs in a world whose slides are recorded.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
-    pub fn run(
-        world: StudyWorld,
-        recorded: &Recorded,
-        simulations: u64,
-        done: impl Fn() + Sync,
-    ) -> Result<Self, StudyError> {
-        let experiment = experiment(recorded, world.seed)?;
-        let columns = METHODS
-            .iter()
-            .map(|&method| Ok(identify(&experiment, method, simulations, &done)?.0))
-            .collect::<Result<_, StudyError>>()?;
-        let rows = pairs(&experiment, of_pair(simulations), &done)?;
-        Ok(Self {
-            seed: world.seed,
-            columns,
-            pairs: rows.iter().map(|row| row.correct).sum::<f64>() / rows.len() as f64,
-        })
-    }
-
-    /// Explorations of [`WorldRow::run`], for a progress bar.
-    pub fn explorations(simulations: u64) -> u64 {
-        METHODS.len() as u64 * simulations + PAIRS.len() as u64 * of_pair(simulations)
     }
 }
 

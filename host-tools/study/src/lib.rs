@@ -10,11 +10,7 @@ pub mod pictures;
 pub mod pilot;
 pub mod published;
 pub mod report;
-mod results;
-pub mod signals;
 pub mod slides;
 pub mod training;
 
 pub use error::StudyError;
-pub use results::{Study, VARIATION};
-pub use slides::Named;

@@ -4,5 +4,4 @@ pub mod control;
 pub mod evaluation;
 pub mod exploration;
 pub mod map;
-mod spectrum;
 pub mod trade_off;

@@ -1,6 +1,6 @@
 //! The pilot study: the best of 36 movements for separating ten textures by each property (figs. 5, 6, 7).
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::Table;
@@ -16,7 +16,7 @@ use tactus_lab::sim::collection::texture_name;
 const SESSION: u64 = 3;
 
 /// The results of the pilot study.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Pilot {
     /// The textures.
     pub textures: Vec<Named>,
@@ -29,28 +29,24 @@ pub struct Pilot {
 }
 
 /// One of the 36 movements.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PilotMovement {
     /// Contact force, N.
     pub force_n: f32,
     /// Sliding speed, mm/s.
     pub speed_mm_s: f32,
-    /// Sliding power with a coefficient of friction of 1, mW (eq. 22).
-    pub power_mw: f32,
     /// True if it is avoided for its wear.
     pub high_wear: bool,
-    /// Wear of the ridges by 100 slides, mean over the textures, %.
-    pub wear: f64,
     /// Uncertainty that one slide leaves among the textures, by property (eq. 11); 1, which is all, for a movement that
     /// was not reached on every texture.
     pub uncertainty: [f32; 3],
     /// Textures on which the rig could not make it.
-    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_reached: Vec<Missed>,
 }
 
 /// A texture on which the rig could not make a movement.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Missed {
     /// Number of the texture.
     pub texture: u8,
@@ -61,7 +57,7 @@ pub struct Missed {
 }
 
 /// The best movement for a property.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MostUseful {
     /// The property.
     pub property: Property,
@@ -69,8 +65,13 @@ pub struct MostUseful {
     pub movement: usize,
     /// The same for the one that the paper found.
     pub paper: usize,
-    /// The best movement of all, including those that wear the skin.
-    pub with_wear: usize,
+}
+
+impl PilotMovement {
+    /// Force, N, and speed, mm/s.
+    pub(crate) fn at(&self) -> (f32, f32) {
+        (self.force_n, self.speed_mm_s)
+    }
 }
 
 impl Pilot {
@@ -88,8 +89,7 @@ impl Pilot {
             movements: &movements,
             trials: PILOT_TRIALS,
             number: SESSION,
-            force_guard: false,
-            may_miss: true,
+            pilot: true,
         };
         let trials = world.record(&session, world.calibration()?, done)?;
         Self::of(&movements, &trials)
@@ -115,24 +115,17 @@ impl Pilot {
             .filter(|&movement| missed(movement).is_empty())
             .collect();
         let uncertainty = uncertainty(movements, &reached, trials)?;
-        let slides = trials.iter().flat_map(|t| t.slides.first()).map(Vec::len);
-        let slides = slides.sum::<usize>().max(1) as f64;
         let rows = movements.iter().zip(&uncertainty).enumerate();
-        let rows = rows.map(|(m, (movement, uncertainty))| {
-            let grown = trials.iter().map(|t| t.wear[m + 1] - t.wear[m]);
-            PilotMovement {
-                force_n: movement.force_n(),
-                speed_mm_s: movement.speed_mm_s(),
-                power_mw: movement.power_mw(),
-                high_wear: movement.is_high_wear(),
-                wear: 1e4 * grown.sum::<f64>() / slides,
-                uncertainty: *uncertainty,
-                not_reached: missed(m),
-            }
+        let rows = rows.map(|(m, (movement, uncertainty))| PilotMovement {
+            force_n: movement.force_n(),
+            speed_mm_s: movement.speed_mm_s(),
+            high_wear: movement.is_high_wear(),
+            uncertainty: *uncertainty,
+            not_reached: missed(m),
         });
-        let best = |property: Property, may: fn(&Movement) -> bool| {
+        let best = |property: Property| {
             let all = movements.iter().zip(&uncertainty).enumerate();
-            all.filter(|(_, (movement, _))| may(movement))
+            all.filter(|(_, (movement, _))| !movement.is_high_wear())
                 .min_by(|a, b| {
                     let [a, b] = [a, b].map(|(_, (_, u))| u[property.index()]);
                     a.total_cmp(&b)
@@ -141,9 +134,8 @@ impl Pilot {
         };
         let most_useful = MOST_USEFUL.map(|(paper, property)| MostUseful {
             property,
-            movement: best(property, |m| !m.is_high_wear()),
+            movement: best(property),
             paper: movements.iter().position(|m| *m == paper).unwrap_or(0),
-            with_wear: best(property, |_| true),
         });
         Ok(Self {
             textures: trials.iter().map(|t| Named::new(t.texture)).collect(),

@@ -6,7 +6,7 @@
 use std::fmt;
 
 use rayon::prelude::*;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, Observation, Property};
 use tactus_core::rig::Fault;
@@ -41,7 +41,7 @@ pub struct StudyWorld {
 }
 
 /// All trials of one texture.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct TextureTrials {
     /// Number of the texture.
     pub texture: u8,
@@ -52,7 +52,6 @@ pub struct TextureTrials {
     /// True if the skin was changed before the first slide.
     pub new_skin: bool,
     /// Movements that the rig could not make on this texture. Only those of the pilot, which keeps them in its own way.
-    #[serde(skip)]
     pub not_reached: Vec<NotReached>,
 }
 
@@ -78,11 +77,10 @@ pub struct Session<'a> {
     pub trials: u32,
     /// Tells sessions of one world apart: their trials differ.
     pub number: u64,
-    /// True if the guard of the force is on. The paper's rig had none, and its pilot study needs forces up to 2 N,
-    /// where the shear on a sticky texture alone takes P_DC over the guard's limit.
-    pub force_guard: bool,
-    /// True if a movement that the rig cannot make is a result, [`TextureTrials::not_reached`], and no failure.
-    pub may_miss: bool,
+    /// True if a movement that the rig cannot make is a result, [`TextureTrials::not_reached`], and no failure, and the
+    /// guard of the force is off. The paper's rig had none, and its pilot study needs forces up to 2 N, where the shear
+    /// on a sticky texture alone takes P_DC over the guard's limit.
+    pub pilot: bool,
 }
 
 impl StudyWorld {
@@ -92,22 +90,6 @@ impl StudyWorld {
             textures: Vec::new(),
             trials: 0,
         }
-    }
-
-    /// A rig with a texture under it, and a finger that is so worn.
-    pub fn rig(self, texture: u8, session: u64, wear: f64) -> SimRig {
-        self.guarded_rig(texture, session, wear, true)
-    }
-
-    fn guarded_rig(self, texture: u8, session: u64, wear: f64, force_guard: bool) -> SimRig {
-        let setup = self.collection().setup(texture, session);
-        let variation = self.variation;
-        let unguarded = if force_guard {
-            Unguarded::default()
-        } else {
-            Unguarded::against(Fault::ForceHigh)
-        };
-        SimRig::under(setup, Conditions { variation, wear }, unguarded)
     }
 
     /// The calibration that the rigs of this world share.
@@ -141,29 +123,6 @@ impl StudyWorld {
             .collect()
     }
 
-    /// Makes slides of textures with a skin that is so worn before each of them.
-    ///
-    /// # Errors
-    /// See [`StudyWorld::record`].
-    pub fn record_worn(
-        self,
-        session: &Session<'_>,
-        wear: f64,
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<TextureTrials>, StudyError> {
-        let plan = Plan::new();
-        session
-            .textures
-            .par_iter()
-            .map(|&texture| {
-                let trials = self.record_texture(session, texture, wear, calibration, &plan)?;
-                done();
-                Ok(trials)
-            })
-            .collect()
-    }
-
     fn record_texture(
         self,
         session: &Session<'_>,
@@ -175,8 +134,14 @@ impl StudyWorld {
         let Session {
             movements, trials, ..
         } = *session;
-        let mut rig = self.guarded_rig(texture, session.number, wear, session.force_guard);
-        rig.control().allow_high_force(!session.force_guard);
+        let setup = self.collection().setup(texture, session.number);
+        let variation = self.variation;
+        let unguarded = match session.pilot {
+            true => Unguarded::against(Fault::ForceHigh),
+            false => Unguarded::default(),
+        };
+        let mut rig = SimRig::under(setup, Conditions { variation, wear }, unguarded);
+        rig.control().allow_high_force(session.pilot);
         let mut measured = TextureTrials {
             texture,
             slides: Vec::with_capacity(movements.len()),
@@ -202,7 +167,7 @@ impl StudyWorld {
                     measured.wear.push(0.0);
                 }
                 let slide = match slide {
-                    Err(why) if session.may_miss => {
+                    Err(why) if session.pilot => {
                         measured.not_reached.push(NotReached {
                             movement: measured.slides.len() - 1,
                             trial,
@@ -254,9 +219,14 @@ fn slide_mm(movement: Movement) -> f64 {
     f64::from((3.0 * movement.speed_mm_s()).min(SlidePath::LONGEST_MM))
 }
 
+/// Variation of trials in the study's worlds: their one free parameter. Set on worlds 1 to 10, by
+/// `tactus study identify --seed N --variation X`, so that Bayesian exploration is right about as often as in the
+/// paper (95.4 %).
+pub const VARIATION: f64 = 1.2;
+
 /// The data for a world's identification: the training of all textures, and the validation trials of those of Tables
 /// 4 and 5.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Recorded {
     /// All 117.
     pub training: Vec<TextureTrials>,
@@ -280,8 +250,7 @@ impl StudyWorld {
             movements: &Collection::MOVEMENTS,
             trials: TRIALS,
             number,
-            force_guard: true,
-            may_miss: false,
+            pilot: false,
         };
         let (training, validation) = rayon::join(
             || self.record(&session(&all, TRAINING), calibration, &done),
@@ -301,17 +270,6 @@ pub struct Named {
     pub number: u8,
     /// The name.
     pub name: &'static str,
-}
-
-impl<'de> Deserialize<'de> for Named {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        /// A texture in the form that has its number only.
-        #[derive(Deserialize)]
-        struct Numbered {
-            number: u8,
-        }
-        Numbered::deserialize(from).map(|Numbered { number }| Self::new(number))
-    }
 }
 
 impl Named {

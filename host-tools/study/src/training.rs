@@ -1,27 +1,16 @@
-//! Training: the properties of 117 textures, their correlations (Table 3), their confusion (figs. 8, 9), and the effect
-//! of a worn skin on the data.
+//! Training: the properties of 117 textures, their correlations (Table 3), and their confusion (fig. 9).
 
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use tactus_core::explorer::{Method, confusion};
 use tactus_core::features::Property;
 use tactus_core::table::{Action, Gaussian, Table};
 
 use super::error::StudyError;
-use super::published::{CORRELATIONS, MOST_USEFUL, PILOT_TEXTURES, SKIN_CHANGES};
-use super::slides::{Named, Session, StudyWorld, TextureTrials, VISIBLE_WEAR, properties};
+use super::published::{CORRELATIONS, MOST_USEFUL};
+use super::slides::{Named, TextureTrials, properties};
 use tactus_lab::eval::evaluate::EvaluateError;
 use tactus_lab::eval::learn::learn;
 use tactus_lab::sim::collection::{Collection, texture_name};
-
-/// Wear at which the skin's effect is shown.
-const WEAR: [f64; 5] = [0.0, VISIBLE_WEAR, 0.25, 0.5, 1.0];
-/// Trials of each texture and movement at each of them.
-const WEAR_TRIALS: u32 = 3;
-/// Number of their session: the touches are the same at any wear.
-const WEAR_SESSION: u64 = 4;
-/// Pairs that are listed as the most confused.
-const LISTED: usize = 12;
 
 /// The results of the training.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -38,30 +27,20 @@ pub struct Training {
     pub geometric_mean: Vec<Vec<f32>>,
     /// Geometric mean of the three of the most useful movements and their properties.
     pub geometric_mean_most_useful: Vec<Vec<f32>>,
-    /// By property: correlation over the textures of its values at two movements, mean over the pairs of movements.
-    pub between_movements: [f64; 3],
     /// Pairs of textures whose geometric mean of the nine is over one half, and the same of the three.
     pub pairs_confused: (usize, usize),
-    /// Pairs of the greatest geometric mean of all nine.
-    pub most_confused: Vec<ConfusedPair>,
-    /// Wear of the skin.
-    pub skin: Skin,
     /// The tables that were learned, as files in the chip's format.
     pub tables: Vec<TableFile>,
 }
 
-/// A texture and its learned Gaussians.
+/// A texture and its trials.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Trained {
     /// The texture.
     #[serde(flatten)]
     pub texture: Named,
-    /// Mean and standard deviation by movement and property, as the table has them.
-    pub gaussians: Vec<[(f32, f32); 3]>,
     /// Traction, roughness and fineness by movement and trial.
     pub properties: Vec<Vec<[f32; 3]>>,
-    /// Wear of the skin before the first slide and after the last, % of the ridges.
-    pub wear: (f64, f64),
     /// True if the skin was changed before the first slide.
     pub new_skin: bool,
 }
@@ -86,50 +65,11 @@ pub struct Confusion {
     pub matrix: Vec<Vec<f32>>,
 }
 
-/// Two textures and their confusion.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct ConfusedPair {
-    /// The textures.
-    pub textures: (Named, Named),
-    /// Geometric mean of the nine degrees of confusion.
-    pub all: f32,
-    /// The same of the three most useful ones.
-    pub most_useful: f32,
-}
-
-/// Wear of the skin during training, and its effect on the data.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Skin {
-    /// The skin was changed before these textures.
-    pub changed_before: Vec<Named>,
-    /// Number of changes in the paper.
-    pub paper_changes: u32,
-    /// Wear at which it is changed, % of the ridges.
-    pub changed_at: f64,
-    /// Effects of wear, by wear and movement.
-    pub effects: Vec<SkinEffect>,
-}
-
-/// Effect of a worn skin on the properties at one movement.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct SkinEffect {
-    /// Wear, % of the ridges.
-    pub wear: f64,
-    /// Place of the movement.
-    pub movement: usize,
-    /// Mean change of each property against a new skin, in standard deviations of trials.
-    pub shift: [f64; 3],
-}
-
 /// A table that was written.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TableFile {
     /// Name of the file.
     pub file: String,
-    /// Its contents.
-    pub contents: String,
-    /// Its length.
-    pub bytes: usize,
     /// Its checksum.
     pub crc: String,
     /// The file itself.
@@ -138,11 +78,11 @@ pub struct TableFile {
 }
 
 impl Training {
-    /// The results of these trials, and of those with worn skins.
+    /// The results of these trials.
     ///
     /// # Errors
     /// See [`StudyError`].
-    pub fn of(trials: &[TextureTrials], worn: &[Worn]) -> Result<Self, StudyError> {
+    pub fn of(trials: &[TextureTrials]) -> Result<Self, StudyError> {
         let movements = Collection::MOVEMENTS;
         let names: Vec<String> = trials
             .iter()
@@ -150,24 +90,14 @@ impl Training {
             .collect();
         let slides: Vec<_> = trials.iter().map(|t| t.slides.clone()).collect();
         let [gaussians, fused] = [
-            (
-                "gaussians.tact",
-                Method::Paper,
-                "one Gaussian per movement and property: the paper's way",
-            ),
-            (
-                "fused.tact",
-                Method::Fused,
-                "all features of a slide, whitened",
-            ),
+            ("gaussians.tact", Method::Paper),
+            ("fused.tact", Method::Fused),
         ]
-        .map(|(file, method, contents)| {
+        .map(|(file, method)| {
             let data = learn(method, None, &names, &movements, &slides)?;
             let table = Table::read(&data).map_err(EvaluateError::from)?;
             Ok::<_, StudyError>(TableFile {
                 file: file.to_owned(),
-                contents: contents.to_owned(),
-                bytes: data.len(),
                 crc: format!("{:08x}", table.crc()),
                 data,
             })
@@ -182,20 +112,9 @@ impl Training {
             let known = table.gaussian(texture as u16, action);
             known.unwrap_or(Gaussian { mean: 0.0, sd: 1.0 })
         };
-        let textures = trials.iter().enumerate().map(|(index, t)| Trained {
+        let textures = trials.iter().map(|t| Trained {
             texture: Named::new(t.texture),
-            gaussians: (0..movements.len())
-                .map(|m| {
-                    Property::ALL
-                        .map(|p| gaussian(index, m, p))
-                        .map(|g| (g.mean, g.sd))
-                })
-                .collect(),
             properties: properties(&t.slides),
-            wear: (
-                100.0 * t.wear.first().copied().unwrap_or(0.0),
-                100.0 * t.wear.last().copied().unwrap_or(0.0),
-            ),
             new_skin: t.new_skin,
         });
         let textures: Vec<Trained> = textures.collect();
@@ -205,7 +124,7 @@ impl Training {
                 let of: Vec<Gaussian> = (0..trials.len())
                     .map(|texture| gaussian(texture, movement, property))
                     .collect();
-                let row = |a: &Gaussian| of.iter().map(|b| degree(*a, *b)).collect();
+                let row = |a: &Gaussian| of.iter().map(|b| confusion(*a, *b)).collect();
                 Confusion {
                     movement,
                     property,
@@ -227,43 +146,18 @@ impl Training {
                     paper: CORRELATIONS[movement],
                 })
                 .collect(),
-            between_movements: std::array::from_fn(|property| {
-                let of = |movement| means(&textures, movement, property);
-                let pairs = [(0, 1), (0, 2), (1, 2)];
-                pairs
-                    .map(|(a, b)| correlation(&of(a), &of(b)))
-                    .iter()
-                    .sum::<f64>()
-                    / 3.0
-            }),
             pairs_confused: (over_half(&all), over_half(&most_useful)),
-            most_confused: most_confused(&textures, &all, &most_useful),
             confusion: confusions,
             geometric_mean: all,
             geometric_mean_most_useful: most_useful,
-            skin: Skin {
-                changed_before: textures
-                    .iter()
-                    .filter(|t| t.new_skin)
-                    .map(|t| t.texture.clone())
-                    .collect(),
-                paper_changes: SKIN_CHANGES,
-                changed_at: 100.0 * VISIBLE_WEAR,
-                effects: skin_effects(worn, &textures),
-            },
             tables,
             textures,
         })
     }
 }
 
-/// Degree of confusion (eq. 7), by the core.
-fn degree(a: Gaussian, b: Gaussian) -> f32 {
-    confusion(a, b)
-}
-
 /// Geometric mean of matrices, element by element.
-pub fn geometric_mean(of: &[&Confusion]) -> Vec<Vec<f32>> {
+fn geometric_mean(of: &[&Confusion]) -> Vec<Vec<f32>> {
     let Some(first) = of.first() else {
         return Vec::new();
     };
@@ -276,24 +170,6 @@ pub fn geometric_mean(of: &[&Confusion]) -> Vec<Vec<f32>> {
     (0..n)
         .map(|i| (0..n).map(|j| element(i, j)).collect())
         .collect()
-}
-
-fn most_confused(
-    textures: &[Trained],
-    all: &[Vec<f32>],
-    most_useful: &[Vec<f32>],
-) -> Vec<ConfusedPair> {
-    let mut pairs: Vec<(usize, usize)> = (0..textures.len())
-        .flat_map(|i| (0..i).map(move |j| (j, i)))
-        .collect();
-    pairs.sort_by(|a, b| all[b.0][b.1].total_cmp(&all[a.0][a.1]));
-    let pairs = pairs.into_iter().take(LISTED);
-    let pair = pairs.map(|(i, j)| ConfusedPair {
-        textures: (textures[i].texture.clone(), textures[j].texture.clone()),
-        all: all[i][j],
-        most_useful: most_useful[i][j],
-    });
-    pair.collect()
 }
 
 /// Pairs whose degree is over one half.
@@ -319,7 +195,7 @@ fn correlations(textures: &[Trained], movement: usize) -> [[f64; 3]; 3] {
 }
 
 /// Pearson's coefficient of correlation.
-pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let (of_a, of_b) = (mean(a), mean(b));
     let sum = |x: &[f64], of_x: f64, y: &[f64], of_y: f64| -> f64 {
@@ -331,68 +207,4 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     } else {
         0.0
     }
-}
-
-/// Slides over textures with a skin that is so worn before each of them.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Worn {
-    /// The wear.
-    pub wear: f64,
-    /// The slides: the same touches as with any other wear.
-    pub trials: Vec<TextureTrials>,
-}
-
-impl Worn {
-    /// Textures of [`Worn::record`], for a progress bar.
-    pub const TEXTURES: u64 = (WEAR.len() * PILOT_TEXTURES.len()) as u64;
-
-    /// Slides over ten textures with a new skin, and with worn ones.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
-    pub fn record(world: StudyWorld, done: impl Fn() + Sync) -> Result<Vec<Self>, StudyError> {
-        let calibration = world.calibration()?;
-        let session = Session {
-            textures: &PILOT_TEXTURES,
-            movements: &Collection::MOVEMENTS,
-            trials: WEAR_TRIALS,
-            number: WEAR_SESSION,
-            force_guard: true,
-            may_miss: false,
-        };
-        let at = |&wear: &f64| {
-            let trials = world.record_worn(&session, wear, calibration, &done)?;
-            Ok(Self { wear, trials })
-        };
-        WEAR.par_iter().map(at).collect()
-    }
-}
-
-/// Changes by worn skins against the first of them, which is new.
-fn skin_effects(worn: &[Worn], textures: &[Trained]) -> Vec<SkinEffect> {
-    let Some(new) = worn.first() else {
-        return Vec::new();
-    };
-    let mean = |t: &TextureTrials, movement: usize, property: usize| {
-        let trials = &properties(&t.slides)[movement];
-        let sum: f64 = trials.iter().map(|p| f64::from(p[property])).sum();
-        sum / trials.len().max(1) as f64
-    };
-    let effect = |worn: &Worn, movement: usize| SkinEffect {
-        wear: 100.0 * worn.wear,
-        movement,
-        shift: std::array::from_fn(|property| {
-            let shifts = new.trials.iter().zip(&worn.trials).map(|(new, worn)| {
-                let known = textures.iter().find(|t| t.texture.number == new.texture);
-                let sd = known.map_or(1.0, |t| t.gaussians[movement][property].1);
-                let change = mean(worn, movement, property) - mean(new, movement, property);
-                change / f64::from(sd)
-            });
-            shifts.sum::<f64>() / new.trials.len().max(1) as f64
-        }),
-    };
-    let movements = 0..Collection::MOVEMENTS.len();
-    worn.iter()
-        .flat_map(|worn| movements.clone().map(move |m| effect(worn, m)))
-        .collect()
 }

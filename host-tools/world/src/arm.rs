@@ -41,7 +41,7 @@ pub struct Arm {
 
 impl Arm {
     /// Height at power-up over the sample as it was measured, mm.
-    pub const BEGINS_MM: f64 = 10.0;
+    pub(crate) const BEGINS_MM: f64 = 10.0;
 
     /// An arm with its finger in the air, over the middle of the sample.
     pub fn new(seed: u64) -> Self {

@@ -68,15 +68,12 @@ enum Doing {
     GoesOver(ArmMovement),
     ComesDown(ArmMovement),
     Trims(ArmMovement, u32),
-    Presses(ArmMovement),
     Ramps(ArmMovement),
     Slides(ArmMovement, f64, u64),
-    Brakes(ArmMovement, u32, u32),
+    Brakes(u32, u32),
     /// It obeys a stop after so many ms.
     Stops(u64),
-    Stands,
     Lifts,
-    Hangs,
 }
 
 /// The program.
@@ -225,7 +222,7 @@ impl ArmProgram {
     fn go_on(&mut self, arm: &mut Arm) {
         let now = self.now_ms;
         match self.doing {
-            Doing::Nothing | Doing::Hangs => arm.go(0.0, 0.0),
+            Doing::Nothing => arm.go(0.0, 0.0),
             Doing::GoesOver(movement) => {
                 let away = begins_mm(&movement) - arm.x_mm();
                 let up = if arm.height_mm() < SAFE_MM {
@@ -238,7 +235,7 @@ impl ArmProgram {
                     self.doing = match self.misbehaves {
                         Some(Misbehaves::SaysPressed) => {
                             self.state = ArmState::Pressed;
-                            Doing::Presses(movement)
+                            Doing::Nothing
                         }
                         _ => Doing::ComesDown(movement),
                     };
@@ -274,10 +271,9 @@ impl ArmProgram {
                 arm.go(0.0, -down.clamp(-fastest, fastest));
                 self.doing = Doing::Trims(movement, if right { right_ms + 1 } else { 0 });
                 if right_ms >= RIGHT_MS {
-                    self.reach(ArmState::Pressed, Doing::Presses(movement));
+                    self.reach(ArmState::Pressed, Doing::Nothing);
                 }
             }
-            Doing::Presses(_) => arm.go(0.0, 0.0),
             Doing::Ramps(movement) => {
                 let speed = f64::from(movement.speed_um_s) * 1e-3 * self.share();
                 arm.go(speed, 0.0);
@@ -304,20 +300,19 @@ impl ArmProgram {
                     if self.share() != 1.0 {
                         made = (movement.length_um.into(), movement.speed_um_s.into());
                     }
-                    self.doing = Doing::Brakes(movement, made.0 as u32, made.1 as u32);
+                    self.doing = Doing::Brakes(made.0 as u32, made.1 as u32);
                 }
             }
-            Doing::Brakes(_, length_um, speed_um_s) => {
+            Doing::Brakes(length_um, speed_um_s) => {
                 arm.go(0.0, 0.0);
                 if arm.stands() {
                     let slid = ArmState::Slid {
                         length_um,
                         speed_um_s,
                     };
-                    self.reach(slid, Doing::Stands);
+                    self.reach(slid, Doing::Nothing);
                 }
             }
-            Doing::Stands => arm.go(0.0, 0.0),
             // until then it continues its motion
             Doing::Stops(at_ms) if now < at_ms => {}
             Doing::Stops(_) => {
@@ -328,7 +323,7 @@ impl ArmProgram {
             }
             Doing::Lifts if self.misbehaves == Some(Misbehaves::SaysLifted) => {
                 arm.go(0.0, 0.0);
-                self.reach(ArmState::Lifted, Doing::Hangs);
+                self.reach(ArmState::Lifted, Doing::Nothing);
             }
             Doing::Lifts => {
                 let missing_mm = SAFE_MM - arm.height_mm();

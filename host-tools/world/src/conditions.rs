@@ -2,9 +2,9 @@
 
 /// Ticks of the world in a second: three for each of the 4400 slots in which the sensor is asked for a sample (PAPER:
 /// both pressures at 2200 Hz).
-pub const TICKS_PER_S: u32 = 13_200;
+pub(crate) const TICKS_PER_S: u32 = 13_200;
 /// Length of a tick, s.
-pub const TICK_S: f64 = 1.0 / 13_200.0;
+pub(crate) const TICK_S: f64 = 1.0 / 13_200.0;
 
 /// Difference between one touch of a texture and the next, unless a world is made with another: see
 /// [`Conditions::variation`]. Chosen.
@@ -15,7 +15,7 @@ pub const TRIAL_VARIATION: f64 = 1.0;
 pub struct Conditions {
     /// Difference between one touch of a texture and the next: a factor on the deviations of the contact's state, drawn
     /// at every touch (see [`finger`](crate::finger)), and on the heterogeneity of the samples (see
-    /// [`surface`](crate::surface)). 0 leaves the start position and the noise of the sensor as the only differences.
+    /// `surface`). 0 leaves the start position and the noise of the sensor as the only differences.
     pub variation: f64,
     /// Wear of the skin to begin with: 0 is new, at 1 its ridges are gone.
     pub wear: f64,

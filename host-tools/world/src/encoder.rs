@@ -85,13 +85,13 @@ impl Encoder {
     }
 
     /// An encoder of this share of the lines, with the stage at a position where it counts 0.
-    pub fn set_lines(&mut self, share: f64, position_mm: f64) {
+    pub(crate) fn set_lines(&mut self, share: f64, position_mm: f64) {
         self.per_mm = COUNTS_PER_MM * share;
         self.origin = (position_mm * self.per_mm).floor();
     }
 
     /// Returns true for each of the lines A and B that is driven at the chip.
-    pub fn is_wired(&self) -> (bool, bool) {
+    pub(crate) fn is_wired(&self) -> (bool, bool) {
         let cut = |line| self.cut == Some(line) || self.cut == Some(Cut::Both);
         (!cut(Cut::A), !cut(Cut::B))
     }
@@ -111,7 +111,7 @@ impl Encoder {
 
     /// Cuts wires, or joins them again, at a time with the stage at a position. Edges of that tick that are yet to come
     /// are changed.
-    pub fn set_cut(&mut self, cut: Option<Cut>, position_mm: f64, now_ns: u64) {
+    pub(crate) fn set_cut(&mut self, cut: Option<Cut>, position_mm: f64, now_ns: u64) {
         if cut == self.cut {
             return;
         }
@@ -137,7 +137,7 @@ impl Encoder {
     }
 
     /// The oldest edge up to `now_ns` that was not fetched yet.
-    pub fn next_edge(&mut self, now_ns: u64) -> Option<Edge> {
+    pub(crate) fn next_edge(&mut self, now_ns: u64) -> Option<Edge> {
         let passed = self.passed.as_mut()?;
         while let Some((_, edge)) = passed.pop_front_if(|(_, edge)| edge.at_ns <= now_ns) {
             if (edge.a, edge.b) != self.shown {
@@ -240,21 +240,5 @@ mod tests {
                 1
             );
         }
-    }
-
-    #[test]
-    fn one_cut_wire_makes_the_count_move_to_and_fro() {
-        for cut in [Cut::A, Cut::B] {
-            let mut encoder = Encoder::new(0.0, false);
-            encoder.set_cut(Some(cut), 0.0, 0);
-            let counts: Vec<i32> = (0..100)
-                .map(|i| encoder.count(f64::from(i) * 1e-3 + 1e-4))
-                .collect();
-            let (low, high) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
-            assert_eq!(high - low, 1, "{cut:?}");
-        }
-        let mut encoder = Encoder::new(0.0, false);
-        encoder.set_cut(Some(Cut::Both), 0.01, 0);
-        assert_eq!(encoder.count(0.01), encoder.count(50.0));
     }
 }

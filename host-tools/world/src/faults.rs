@@ -244,7 +244,6 @@ impl Faults {
 pub const BOUNCES_NS: u64 = 4_000_000;
 const BOUNCE_NS: u64 = 350_000;
 
-/// The emergency stop.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stop {
     pressed_ns: Option<u64>,
@@ -301,7 +300,6 @@ impl Switches {
         self.were = now.map(|closed| (closed, 0));
     }
 
-    /// Takes the switches at this time.
     pub(super) fn watch(&mut self, now: [bool; 3], at_ns: u64) {
         if self.bounce_ns == 0 {
             return;
@@ -313,7 +311,6 @@ impl Switches {
         }
     }
 
-    /// Levels of their contacts.
     pub(super) fn read(&self, now: [bool; 3], at_ns: u64) -> [bool; 3] {
         std::array::from_fn(|n| {
             self.stuck[n].unwrap_or(now[n] ^ is_back(self.were[n].1, at_ns, self.bounce_ns))

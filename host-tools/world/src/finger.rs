@@ -30,10 +30,11 @@ pub(super) use stimulus::Stimulus;
 use tactus_core::sensor::FingerName;
 use vibration::Vibrations;
 
-pub use amplifier::{
-    PA_PER_N, PAC_NOISE_FIELD_COUNTS, PAC_NOISE_PA, PAC_PA_PER_COUNT, PDC_PA_PER_COUNT,
-};
-pub use skin::N_PER_COUNT;
+pub(crate) use amplifier::PA_PER_N;
+#[cfg(test)]
+pub(crate) use amplifier::PAC_PA_PER_COUNT;
+#[cfg(test)]
+pub(crate) use skin::N_PER_COUNT;
 
 /// Deviations of the contact's state, drawn at every touch and multiplied by [`Conditions::variation`]; all chosen.
 mod touch {
@@ -79,7 +80,7 @@ fn wear_per_s(power_mw: f64) -> f64 {
     1e-3 * power_mw / SKIN_LIFE_J * (1.0 + excess * excess)
 }
 
-/// Wear that sliding over a texture takes, for each mm: what [`Finger::wear`] will grow by, but for the variation of
+/// Wear that sliding over a texture takes, for each mm: what the finger's will grow by, but for the variation of
 /// touches.
 pub fn wear_per_mm(texture: &Texture, force_n: f64, speed_mm_s: f64) -> f64 {
     let power_mw = texture.mean_friction(speed_mm_s, force_n) * force_n * speed_mm_s;
@@ -88,17 +89,17 @@ pub fn wear_per_mm(texture: &Texture, force_n: f64, speed_mm_s: f64) -> f64 {
 
 /// The surface under the finger and the finger's motion.
 #[derive(Clone, Copy)]
-pub struct Contact<'a> {
+pub(crate) struct Contact<'a> {
     /// Depth by which the skin is pressed against the surface, mm; not touching if not above 0.
-    pub indentation_mm: f64,
+    pub(crate) indentation_mm: f64,
     /// The surface under the finger.
-    pub surface: Option<&'a Surface>,
+    pub(crate) surface: Option<&'a Surface>,
     /// Position of the finger on the sample, mm.
-    pub x_mm: f64,
+    pub(crate) x_mm: f64,
     /// Velocity of the finger along the sample, mm/s.
-    pub speed_mm_s: f64,
+    pub(crate) speed_mm_s: f64,
     /// Pressure that the vibration of the mounting adds, Pa.
-    pub lever_vibration: f64,
+    pub(crate) lever_vibration: f64,
 }
 
 /// State of one contact, drawn when the skin lands: deviations in units of those in [`touch`], and the factor on the
@@ -112,14 +113,13 @@ struct Touch {
 }
 
 /// A BioTac.
-pub struct Finger {
+pub(crate) struct Finger {
     noise: Noise,
     variation: f64,
     skin: Skin,
     vibrations: Vibrations,
     signals: Signals,
-    held: Held,
-    /// the present contact
+    pub(super) held: Held,
     touch: Option<Touch>,
     /// relative unsteadiness of friction
     unsteady: f64,
@@ -129,11 +129,13 @@ pub struct Finger {
     friction: f64,
     look_again: u32,
     slipping: bool,
-    shear_n: f64,
-    wear: f64,
+    /// shear force, N; it opposes the motion
+    pub(super) shear_n: f64,
+    /// wear of the skin: 0 is new, at 1 its ridges are gone
+    pub(super) wear: f64,
     /// time in which the fluid's pressure runs out of a torn skin, s, and the force that it no longer carries, N
     /// (faults)
-    leak_s: Option<f64>,
+    pub(super) leak_s: Option<f64>,
     leaked_n: f64,
     /// recorded slides instead of what the surface does
     playback: Option<Playback>,
@@ -141,13 +143,14 @@ pub struct Finger {
 
 impl Finger {
     /// A finger with a new skin.
-    pub fn new(seed: u64) -> Self {
+    #[cfg(test)]
+    pub(crate) fn new(seed: u64) -> Self {
         Self::under([seed; 2], Conditions::default())
     }
 
     /// A finger under other conditions than the usual ones. The first seed draws its properties, the second one the
     /// events of this trial: its landings and its noise.
-    pub fn under([made, trial]: [u64; 2], conditions: Conditions) -> Self {
+    pub(crate) fn under([made, trial]: [u64; 2], conditions: Conditions) -> Self {
         let mut noise = Noise::new(trial, 500);
         Self {
             variation: conditions.variation,
@@ -170,19 +173,9 @@ impl Finger {
         }
     }
 
-    /// The same finger with another noise of the amplifier of P_AC, in counts rms: 1.4 as in the paper, which is the
-    /// default, or [`PAC_NOISE_FIELD_COUNTS`] as in recordings of real devices.
-    #[must_use]
-    pub fn with_pac_noise(mut self, counts: f64) -> Self {
-        if let Some(amplifiers) = self.amplifiers() {
-            amplifiers.set_pac_noise(counts * PAC_PA_PER_COUNT);
-        }
-        self
-    }
-
     /// The same skin on the transducers of another kind of finger, whose first seed is `made`.
     #[must_use]
-    pub fn of(mut self, finger: FingerName, made: u64) -> Self {
+    pub(crate) fn of(mut self, finger: FingerName, made: u64) -> Self {
         let made = &mut Noise::new(made, 502);
         match finger {
             FingerName::Biotac => {}
@@ -192,16 +185,12 @@ impl Finger {
         self
     }
 
-    /// From now on it is held like this.
-    pub fn hold(&mut self, held: Held) {
-        self.held = held;
-    }
-
     pub(super) fn signals(&self) -> &Signals {
         &self.signals
     }
 
-    fn amplifiers(&mut self) -> Option<&mut Amplifiers> {
+    /// Those of a BioTac.
+    pub(super) fn amplifiers(&mut self) -> Option<&mut Amplifiers> {
         match &mut self.signals {
             Signals::Fluid(amplifiers) => Some(amplifiers),
             _ => None,
@@ -227,26 +216,26 @@ impl Finger {
         };
         match (&mut self.signals, fault) {
             (Signals::Analog(analog), PartFault::CellWire) => analog.wire_cut = true,
-            (Signals::Analog(analog), _) => analog.cell().set_gain(gain),
-            (Signals::Mems(mems), _) => mems.cell().set_gain(gain),
+            (Signals::Analog(analog), _) => analog.cell.gain = gain,
+            (Signals::Mems(mems), _) => mems.cell.gain = gain,
             (Signals::Fluid(_), _) => {}
         }
     }
 
     /// From now on slides feel like these, in an order that `seed` gives; without any, like the surface again.
-    pub fn play(&mut self, slides: Vec<Played>, seed: u64) {
+    pub(crate) fn play(&mut self, slides: Vec<Played>, seed: u64) {
         self.playback = (!slides.is_empty()).then(|| Playback::new(slides, seed));
     }
 
     /// Counts of the slides and samples played so far.
-    pub fn played(&self) -> PlayCounts {
+    pub(crate) fn played(&self) -> PlayCounts {
         self.playback
             .as_ref()
             .map_or_else(PlayCounts::default, Playback::counts)
     }
 
-    /// Advances by [`TICK_S`].
-    pub fn tick(&mut self, contact: &Contact<'_>) {
+    /// Advances by a tick.
+    pub(crate) fn tick(&mut self, contact: &Contact<'_>) {
         if let Some(playback) = &mut self.playback {
             let touching = contact.surface.is_some() && contact.indentation_mm > 0.0;
             playback.tick(touching, contact.speed_mm_s);
@@ -303,7 +292,7 @@ impl Finger {
             Some(touch) => touch,
             None => self.land(),
         };
-        let texture = surface.texture();
+        let texture = &surface.texture;
         let force = self.skin.fluid_n();
         let deviation = touch::VIBRATION + touch::VIBRATION_PER_N * force;
         let amplitude = deviation * touch.vibration;
@@ -342,7 +331,6 @@ impl Finger {
             .sliding_pa(surface, contact.x_mm, sliding, self.shear_n.abs(), white)
     }
 
-    /// Draws the state of a new contact.
     fn land(&mut self) -> Touch {
         let mut draw = || self.variation * self.noise.normal();
         let touch = Touch {
@@ -380,70 +368,26 @@ impl Finger {
     }
 
     /// Force on the skin, N.
-    pub fn force_n(&self) -> f64 {
+    pub(crate) fn force_n(&self) -> f64 {
         self.skin.force_n()
     }
 
-    /// Shear force on the finger, N; it opposes the motion.
-    pub fn shear_n(&self) -> f64 {
-        self.shear_n
-    }
-
-    /// Wear of the skin: 0 is new, at 1 its ridges are gone.
-    pub fn wear(&self) -> f64 {
-        self.wear
-    }
-
-    /// Puts on a new skin.
-    pub fn replace_skin(&mut self) {
-        self.put_on_skin(0.0);
-    }
-
     /// Puts on a skin that is worn: 0 is new, at 1 its ridges are gone.
-    pub fn put_on_skin(&mut self, wear: f64) {
+    pub(crate) fn put_on_skin(&mut self, wear: f64) {
         self.wear = wear.clamp(0.0, 1.0);
     }
 
-    /// From now on the skin leaks: see `Fault::SkinLeaks`.
-    pub fn leak(&mut self, seconds: f64) {
-        self.leak_s = Some(seconds);
-    }
-
-    /// From now on P_DC fades: see `Fault::PdcFades`.
-    pub fn fade_pdc(&mut self, seconds: f64) {
-        if let Some(amplifiers) = self.amplifiers() {
-            amplifiers.fade_pdc(seconds);
-        }
-    }
-
-    /// From now on P_DC has this gain: see `Fault::PdcWeak`.
-    pub fn weaken_pdc(&mut self, gain: f64) {
-        if let Some(amplifiers) = self.amplifiers() {
-            amplifiers.weaken_pdc(gain);
-        }
-    }
-
     /// Fills a torn skin, and mends the amplifier.
-    pub fn mend(&mut self) {
+    pub(crate) fn mend(&mut self) {
         (self.leak_s, self.leaked_n) = (None, 0.0);
         match &mut self.signals {
             Signals::Fluid(amplifiers) => amplifiers.mend(),
             Signals::Analog(analog) => {
                 analog.wire_cut = false;
-                analog.cell().set_gain(1.0);
+                analog.cell.gain = 1.0;
             }
-            Signals::Mems(mems) => mems.cell().set_gain(1.0),
+            Signals::Mems(mems) => mems.cell.gain = 1.0,
         }
-    }
-
-    /// Samples P_AC, in counts, `fraction` (0..1) of a tick after the last but one.
-    pub fn sample_pac(&mut self, fraction: f64) -> u16 {
-        self.sample_channel(0, fraction)
-    }
-
-    /// Samples P_DC, in counts, `fraction` (0..1) of a tick after the last but one.
-    pub fn sample_pdc(&mut self, fraction: f64) -> u16 {
-        self.sample_channel(1, fraction)
     }
 
     /// Reading of a converter of 12 bits on P_AC (0) or P_DC (1). An accelerometer has none.

@@ -34,7 +34,7 @@ const AFTER_WRITE_NS: (u64, u64) = (10_500, 6_000);
 const AFTER_READ_NS: u64 = 1_500;
 const TO_DATA_NS: u64 = 2_000;
 /// Shortest time of a byte, ns: 2 MHz.
-pub const BYTE_NS: u64 = 4_000;
+pub(crate) const BYTE_NS: u64 = 4_000;
 /// From a reset until it answers (chosen: drivers wait 0 to 20 ms).
 const RESET_NS: u64 = 15_000_000;
 /// Stillness after which it stops, ns (chosen).
@@ -65,7 +65,6 @@ pub struct Flow {
     counts: f64,
     frame_ns: u64,
     frame_x_mm: f64,
-    /// the world's last time and place
     at_ns: u64,
     x_mm: f64,
     moved_ns: u64,
@@ -76,7 +75,6 @@ pub struct Flow {
     spoiled: bool,
     last_ns: u64,
     last_wrote: Option<bool>,
-    /// accesses that broke its timing
     refused: u32,
 }
 

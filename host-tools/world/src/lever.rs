@@ -18,25 +18,25 @@ use super::maths::{cos, sin};
 use super::noise::Noise;
 
 /// Movement of the tip per microstep: 2 mm / (200 x 16).
-pub const STEP_UM: f64 = 0.625;
+pub(crate) const STEP_UM: f64 = 0.625;
 /// Microsteps in which the driver's currents repeat: four full steps.
 const PERIOD: i64 = 64;
 /// STEP must stay at each level this long (chosen: it suits every common driver). A shorter pulse is no step.
-pub const STEP_LEVEL_NS: u64 = 4_000;
+pub(crate) const STEP_LEVEL_NS: u64 = 4_000;
 /// DIR must be stable this long before STEP rises. Else the step is lost.
-pub const DIR_SETUP_NS: u64 = 1_000;
+pub(crate) const DIR_SETUP_NS: u64 = 1_000;
 /// Fastest rate at which the motor starts and stops without a ramp, microsteps/s; 4 mm/s (chosen).
-pub const START_STOP_PER_S: f64 = 6_400.0;
+pub(crate) const START_STOP_PER_S: f64 = 6_400.0;
 /// Rate at which back-EMF leaves no torque, microsteps/s; 15 mm/s (chosen).
-pub const TOP_PER_S: f64 = 24_000.0;
+pub(crate) const TOP_PER_S: f64 = 24_000.0;
 /// Steepest ramp above the start/stop rate, microsteps/s^2; 200 mm/s^2 (chosen).
-pub const RAMP_PER_S2: f64 = 320_000.0;
+pub(crate) const RAMP_PER_S2: f64 = 320_000.0;
 /// Tolerance of a single interval above the ramp: STEP from software jitters (chosen).
 const RATE_SLACK: f64 = 1.02;
 /// Load that the standing motor holds, N (chosen); falls linearly to nothing at [`TOP_PER_S`].
-pub const HOLD_N: f64 = 12.0;
+pub(crate) const HOLD_N: f64 = 12.0;
 /// Play between screw and nut, um (chosen). A pressed finger keeps it closed: it shows only with the finger in the air.
-pub const BACKLASH_UM: f64 = 15.0;
+pub(crate) const BACKLASH_UM: f64 = 15.0;
 /// Finger force that overcomes the lever's own friction and closes the play, N (chosen).
 const CLOSES_PLAY_N: f64 = 0.05;
 /// Largest error of a microstep's place, um: 5 % of a full step, not accumulating (usual for such motors), once per
@@ -44,15 +44,15 @@ const CLOSES_PLAY_N: f64 = 0.05;
 const STEP_ERROR_UM: [f64; 2] = [0.25, 0.25];
 /// Height of the fingertip over the steel plate with the lever at the upper hard stop, mm (chosen: over every sample;
 /// foams and furs have 6 to 15 mm, so that some touch the finger before it has homed).
-pub const TOP_MM: f64 = 16.0;
+pub(crate) const TOP_MM: f64 = 16.0;
 /// Way from the upper to the lower hard stop, mm (chosen).
-pub const TRAVEL_MM: f64 = 17.5;
+pub(crate) const TRAVEL_MM: f64 = 17.5;
 /// The limit switch closes this far below the upper hard stop, mm, and opens [`LIMIT_HYSTERESIS_MM`] lower (chosen).
-pub const LIMIT_MM: f64 = 0.5;
+pub(crate) const LIMIT_MM: f64 = 0.5;
 /// Way between closing and opening of the limit switch, mm (chosen: a micro switch).
-pub const LIMIT_HYSTERESIS_MM: f64 = 0.05;
+pub(crate) const LIMIT_HYSTERESIS_MM: f64 = 0.05;
 /// Speed with which a runaway driver steps down, microsteps/s: the approach's own (chosen).
-pub const RUNAWAY_PER_S: f64 = 800.0;
+pub(crate) const RUNAWAY_PER_S: f64 = 800.0;
 /// Stream of the seeds that the lever draws from.
 const STREAM: u64 = 0x1e7e;
 /// Without a step for this long the motor stands, and hums in a new way.
@@ -60,18 +60,16 @@ const STANDS_NS: u64 = 20_000_000;
 /// A motor that was faster than the start/stop rate and gets no step for this long has run past its stop.
 const OVERRUN_NS: u64 = 2_000_000;
 
-/// The lever and its driver.
 #[derive(Clone, Debug)]
-pub struct Lever {
+pub(crate) struct Lever {
     step: Pin,
     dir: Pin,
     enabled: bool,
     /// DIR's wire comes in inverted (fault)
-    inverted: bool,
+    pub(super) inverted: bool,
     /// a coil has no current: the rotor does not turn
-    coil_open: bool,
-    /// microsteps of a pulse
-    per_pulse: i64,
+    pub(super) coil_open: bool,
+    pub(super) per_pulse: i64,
     /// whether the last rising edge was a step: a short pulse takes it back
     last_edge_stepped: bool,
     last_step_ns: Option<u64>,
@@ -88,22 +86,23 @@ pub struct Lever {
     screw: (f64, f64),
     /// how much of the play is above the tip, um
     play_um: f64,
-    height_mm: f64,
+    /// height of the fingertip's undeformed surface over the steel plate, mm
+    pub(super) height_mm: f64,
     error_phase: [f64; 2],
     at_top: bool,
-    /// a finger holds its switch
-    held: bool,
+    /// a person holds its switch actuated
+    pub(super) held: bool,
     vibration: Hum,
     noise: Noise,
     began_at: f64,
     asked: i64,
-    bad_pulses: u64,
+    /// pulses that broke [`STEP_LEVEL_NS`] or [`DIR_SETUP_NS`]
+    pub(super) bad_pulses: u64,
     /// share of steps that the motor misses (fault)
-    lost_share: f64,
+    pub(super) lost_share: f64,
     runaway: Option<Runaway>,
 }
 
-/// A level and when it came.
 #[derive(Clone, Copy, Default, Debug)]
 struct Pin {
     high: bool,
@@ -129,7 +128,7 @@ struct Runaway {
 impl Lever {
     /// A lever without current, its tip `height_mm` over the plate. The motor's microstep errors are drawn from
     /// `world_seed`, its hum from `trial_seed`.
-    pub fn new(height_mm: f64, world_seed: u64, trial_seed: u64) -> Self {
+    pub(crate) fn new(height_mm: f64, world_seed: u64, trial_seed: u64) -> Self {
         let mut motor = Noise::new(world_seed, STREAM);
         let rotor = ((TOP_MM - height_mm) * 1e3 / STEP_UM).round();
         let mut lever = Self {
@@ -166,7 +165,7 @@ impl Lever {
     }
 
     /// The level of STEP. A rising edge is a step, with or without current; `load_n` is the finger's force.
-    pub fn step(&mut self, at_ns: u64, high: bool, load_n: f64) {
+    pub(crate) fn step(&mut self, at_ns: u64, high: bool, load_n: f64) {
         if high == self.step.high {
             return;
         }
@@ -205,7 +204,7 @@ impl Lever {
     }
 
     /// The level of DIR: high is down.
-    pub fn dir(&mut self, at_ns: u64, high: bool) {
+    pub(crate) fn dir(&mut self, at_ns: u64, high: bool) {
         if high != self.dir.high {
             self.dir = Pin {
                 high,
@@ -216,7 +215,7 @@ impl Lever {
 
     /// The level of EN: high gives current. Without it the driver still counts steps, as an A4988 does, but the rotor
     /// stays where it is, and snaps to the nearest fitting place when the current returns.
-    pub fn enable(&mut self, high: bool, load_n: f64) {
+    pub(crate) fn enable(&mut self, high: bool, load_n: f64) {
         if high == self.enabled {
             return;
         }
@@ -233,7 +232,7 @@ impl Lever {
     }
 
     /// Lets one tick pass that ends at `now_ns`, with the finger pushing up with `load_n`.
-    pub fn tick(&mut self, now_ns: u64, load_n: f64) {
+    pub(crate) fn tick(&mut self, now_ns: u64, load_n: f64) {
         if !self.enabled {
             return;
         }
@@ -254,67 +253,31 @@ impl Lever {
         self.vibration.tick();
     }
 
-    /// Height of the fingertip's undeformed surface over the steel plate, mm.
-    pub fn height_mm(&self) -> f64 {
-        self.height_mm
-    }
-
     /// Pressure in the finger's fluid by the motor's vibration, Pa; 0 without current.
-    pub fn vibration_pa(&self) -> f64 {
+    pub(crate) fn vibration_pa(&self) -> f64 {
         self.vibration.value()
     }
 
-    /// The limit switch at the top.
-    pub fn at_top(&self) -> bool {
+    pub(crate) fn at_top(&self) -> bool {
         self.at_top || self.held
     }
 
-    /// A finger holds its switch actuated, or not.
-    pub fn hold_switch(&mut self, held: bool) {
-        self.held = held;
-    }
-
     /// Steps down that STEP edges commanded and the rotor did not make, less those up.
-    pub fn missing_steps(&self) -> f64 {
+    pub(crate) fn missing_steps(&self) -> f64 {
         self.asked as f64 - (self.rotor - self.began_at)
     }
 
-    /// Pulses that broke [`STEP_LEVEL_NS`] or [`DIR_SETUP_NS`].
-    pub fn bad_pulses(&self) -> u64 {
-        self.bad_pulses
-    }
-
-    /// Inverts DIR from now on; `false` ends it.
-    pub fn invert_dir(&mut self, on: bool) {
-        self.inverted = on;
-    }
-
-    /// A coil of the motor is not connected.
-    pub fn open_coil(&mut self) {
-        self.coil_open = true;
-    }
-
-    /// The driver makes so many microsteps of a pulse, and not one.
-    pub fn set_microsteps(&mut self, per_pulse: i64) {
-        self.per_pulse = per_pulse;
-    }
-
     /// Turns the screw by its knob while there is no current: so far up, mm. Whether it could be turned.
-    pub fn turn_by_hand(&mut self, up_mm: f64, load_n: f64) -> bool {
+    pub(crate) fn turn_by_hand(&mut self, up_mm: f64, load_n: f64) -> bool {
         if !self.enabled {
             self.turn(-up_mm * 1e3 / STEP_UM, load_n);
         }
         !self.enabled
     }
 
-    /// From now on the motor misses this share of the steps.
-    pub fn lose_steps(&mut self, share: f64) {
-        self.lost_share = share;
-    }
-
     /// From now on the driver steps down by itself, [`RUNAWAY_PER_S`], until the current is off or more steps up were
     /// commanded than it made; `false` ends it.
-    pub fn run_away_down(&mut self, on: bool) {
+    pub(crate) fn run_away_down(&mut self, on: bool) {
         self.runaway = on.then(Runaway::default);
     }
 

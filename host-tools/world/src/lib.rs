@@ -19,25 +19,24 @@ pub mod encoder;
 pub mod faults;
 pub mod finger;
 pub mod flow;
-pub mod lever;
+mod lever;
 pub mod maths;
 pub mod motion;
 pub mod mount;
 pub mod noise;
 pub mod parts;
 pub mod person;
-pub use person as hand;
 pub mod played;
 pub mod ripple;
 pub mod sensor;
 pub mod slot;
 pub mod stage;
-pub mod surface;
+mod surface;
 pub mod textures;
 pub mod wiring;
 pub mod world;
 
-pub use conditions::{Conditions, TICK_S, TICKS_PER_S, TRIAL_VARIATION};
+pub use conditions::{Conditions, TRIAL_VARIATION};
 
 #[cfg(test)]
 mod tests;

@@ -7,13 +7,11 @@ use tactus_core::sensor::paa5100je::Paa5100je;
 
 use super::flow::{BYTE_NS, Flow, Ground};
 
-/// The part and the time of its bus.
 #[derive(Debug)]
 struct Bus {
     flow: Flow,
     now_ns: u64,
     x_mm: f64,
-    /// Factor on the pauses.
     pauses: f64,
 }
 

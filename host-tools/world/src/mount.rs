@@ -9,7 +9,7 @@ pub struct Mount {
     preload_n: f64,
     n_per_mm: f64,
     /// Yield of the spring, mm.
-    pushed_mm: f64,
+    pub(super) pushed_mm: f64,
 }
 
 impl Mount {
@@ -40,11 +40,6 @@ impl Mount {
         let over_n = force_n - self.preload_n - self.n_per_mm * self.pushed_mm;
         self.pushed_mm = (self.pushed_mm + over_n / SETTLES_N_PER_MM).max(0.0);
     }
-
-    /// Yield of the spring, mm.
-    pub fn pushed_mm(&self) -> f64 {
-        self.pushed_mm
-    }
 }
 
 #[cfg(test)]
@@ -56,7 +51,7 @@ mod tests {
         let mut mount = Mount::SPRUNG;
         let after = |mount: &mut Mount, force_n: f64| {
             (0..20_000).for_each(|_| mount.tick(force_n));
-            mount.pushed_mm()
+            mount.pushed_mm
         };
         assert_eq!(after(&mut mount, 1.44), 0.0);
         assert!((after(&mut mount, 1.65) - 5.0).abs() < 0.1);

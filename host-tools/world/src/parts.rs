@@ -20,40 +20,38 @@ pub use fault::PartFault;
 pub(super) enum Peers {
     BioTac(SensorPeer),
     Analog(mcp3202::Mcp3202),
-    Mems {
-        accelerometer: iis3dwb::Iis3dwb,
-        cell: ads1220::Ads1220,
-        selected: Option<bool>,
-        unplugged: bool,
-        /// Only the accelerometer is.
-        without_accelerometer: bool,
-    },
+    Mems(Mems),
+}
+
+pub(super) struct Mems {
+    accelerometer: iis3dwb::Iis3dwb,
+    cell: ads1220::Ads1220,
+    /// the accelerometer, or the cell
+    selected: Option<bool>,
+    unplugged: bool,
+    /// only the accelerometer is
+    without_accelerometer: bool,
 }
 
 impl Peers {
-    /// The parts of such a finger.
     pub(super) fn new(finger: &Finger, seed: u64) -> Self {
         match finger.signals() {
             Signals::Fluid(_) => Self::BioTac(SensorPeer::new(seed)),
             Signals::Analog(_) => Self::Analog(mcp3202::Mcp3202::default()),
-            Signals::Mems(_) => Self::Mems {
+            Signals::Mems(_) => Self::Mems(Mems {
                 accelerometer: iis3dwb::Iis3dwb::new(seed),
                 cell: ads1220::Ads1220::new(seed),
                 selected: None,
                 unplugged: false,
                 without_accelerometer: false,
-            },
+            }),
         }
     }
 
     /// Number of complaints of the parts.
     pub(super) fn complaints(&self) -> u64 {
         match self {
-            Self::Mems {
-                accelerometer,
-                cell,
-                ..
-            } => accelerometer.complaints() + cell.complaints(),
+            Self::Mems(parts) => parts.accelerometer.complaints + parts.cell.complaints,
             _ => 0,
         }
     }
@@ -63,50 +61,30 @@ impl Peers {
         match self {
             Self::BioTac(sensor) => sensor.plug(now_ns),
             Self::Analog(converter) => *converter = mcp3202::Mcp3202::default(),
-            Self::Mems {
-                cell,
-                unplugged,
-                without_accelerometer,
-                ..
-            } => {
-                cell.mend_wire();
-                (*unplugged, *without_accelerometer) = (false, false);
+            Self::Mems(parts) => {
+                parts.cell.wire_cut = false;
+                (parts.unplugged, parts.without_accelerometer) = (false, false);
             }
         }
     }
 
     /// A tick of the world is over: advances the parts that run without the bus.
     pub(super) fn tick(&mut self, now_ns: u64, finger: &Finger) {
-        if let (
-            Self::Mems {
-                accelerometer,
-                cell,
-                ..
-            },
-            Signals::Mems(mems),
-        ) = (self, finger.signals())
-        {
-            accelerometer.tick(now_ns, mems.acceleration_g());
-            cell.tick(now_ns, mems.cell_ratio());
+        if let (Self::Mems(parts), Signals::Mems(mems)) = (self, finger.signals()) {
+            parts.accelerometer.tick(now_ns, mems.acceleration_g);
+            parts.cell.tick(now_ns, mems.cell_ratio());
         }
     }
 
-    /// Chip select of a part falls.
     pub(super) fn select(&mut self, now_ns: u64, part: u8, mode: ClockMode) {
         match self {
             Self::BioTac(sensor) => sensor.select(now_ns),
             Self::Analog(converter) => converter.select(mode),
-            Self::Mems {
-                accelerometer,
-                cell,
-                selected,
-                ..
-            } => {
-                *selected = Some(part == 0);
-                if part == 0 {
-                    accelerometer.select(now_ns, mode);
-                } else {
-                    cell.select(now_ns, mode);
+            Self::Mems(parts) => {
+                parts.selected = Some(part == 0);
+                match part {
+                    0 => parts.accelerometer.select(now_ns, mode),
+                    _ => parts.cell.select(now_ns, mode),
                 }
             }
         }
@@ -122,73 +100,47 @@ impl Peers {
             Self::Analog(converter) => {
                 converter.byte(mosi, |channel| finger.sample_channel(channel, fraction))
             }
-            Self::Mems {
-                accelerometer,
-                cell,
-                selected,
-                unplugged,
-                without_accelerometer,
-            } => match *selected {
-                _ if *unplugged => FLOATING,
-                Some(true) if *without_accelerometer => FLOATING,
-                Some(true) => accelerometer.byte(now_ns, mosi),
-                Some(false) => cell.byte(now_ns, mosi),
+            Self::Mems(parts) => match parts.selected {
+                _ if parts.unplugged => FLOATING,
+                Some(true) if parts.without_accelerometer => FLOATING,
+                Some(true) => parts.accelerometer.byte(now_ns, mosi),
+                Some(false) => parts.cell.byte(now_ns, mosi),
                 None => FLOATING,
             },
         }
     }
 
-    /// Chip select rises.
     pub(super) fn deselect(&mut self, now_ns: u64) {
         match self {
             Self::BioTac(sensor) => sensor.deselect(now_ns),
             Self::Analog(converter) => converter.deselect(),
-            Self::Mems {
-                accelerometer,
-                cell,
-                selected,
-                ..
-            } => {
-                if selected.take() == Some(true) {
-                    accelerometer.deselect();
-                } else {
-                    cell.deselect();
-                }
-            }
+            Self::Mems(parts) => match parts.selected.take() {
+                Some(true) => parts.accelerometer.deselect(),
+                _ => parts.cell.deselect(),
+            },
         }
     }
 
     /// Breaks a part; a fault of a part that the finger does not have is ignored.
     pub(super) fn break_part(&mut self, now_ns: u64, fault: PartFault, finger: &mut Finger) {
         match (self, fault) {
-            (Self::Analog(converter), PartFault::Unplugged) => converter.unplug(),
-            (Self::Mems { unplugged, .. }, PartFault::Unplugged) => *unplugged = true,
-            (
-                Self::Mems {
-                    without_accelerometer,
-                    ..
-                },
-                PartFault::AccelerometerUnplugged,
-            ) => *without_accelerometer = true,
-            (Self::Mems { accelerometer, .. }, PartFault::AccelerometerBrownOut) => {
-                accelerometer.brown_out(now_ns);
+            (Self::Analog(converter), PartFault::Unplugged) => converter.unplugged = true,
+            (Self::Mems(parts), PartFault::Unplugged) => parts.unplugged = true,
+            (Self::Mems(parts), PartFault::AccelerometerUnplugged) => {
+                parts.without_accelerometer = true;
             }
-            (Self::Mems { cell, .. }, PartFault::CellBrownOut) => cell.brown_out(now_ns),
-            (
-                Self::Mems {
-                    accelerometer,
-                    cell,
-                    ..
-                },
-                PartFault::ClocksOff { share },
-            ) => {
-                accelerometer.set_clock(share);
-                cell.set_clock(share);
+            (Self::Mems(parts), PartFault::AccelerometerBrownOut) => {
+                parts.accelerometer.brown_out(now_ns);
             }
-            (Self::Mems { accelerometer, .. }, PartFault::AccelerometerOff { share, zero_g }) => {
-                accelerometer.set_scale(share, zero_g);
+            (Self::Mems(parts), PartFault::CellBrownOut) => parts.cell.brown_out(now_ns),
+            (Self::Mems(parts), PartFault::ClocksOff { share }) => {
+                parts.accelerometer.set_clock(share);
+                parts.cell.clock = share;
             }
-            (Self::Mems { cell, .. }, PartFault::CellWire) => cell.cut_wire(),
+            (Self::Mems(parts), PartFault::AccelerometerOff { share, zero_g }) => {
+                parts.accelerometer.scale = (share, zero_g);
+            }
+            (Self::Mems(parts), PartFault::CellWire) => parts.cell.wire_cut = true,
             _ => finger.break_part(fault),
         }
     }

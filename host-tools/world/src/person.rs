@@ -91,9 +91,10 @@ pub struct Hand {
     /// its intention
     force_n: f64,
     pace_mm_s: f64,
-    indentation_mm: f64,
+    /// depth of the sample in the fingertip, mm; negative is a gap
+    pub(super) indentation_mm: f64,
     x_mm: f64,
-    speed_mm_s: f64,
+    pub(super) speed_mm_s: f64,
     wander: f64,
     uneven: f64,
     /// a band-pass of noise
@@ -204,19 +205,9 @@ impl Hand {
         }
     }
 
-    /// Depth of the sample in the fingertip, mm; negative is a gap.
-    pub fn indentation_mm(&self) -> f64 {
-        self.indentation_mm
-    }
-
     /// Place of the finger on the sample, mm from its edge.
     pub fn x_mm(&self) -> f64 {
         self.x_mm
-    }
-
-    /// Its speed along the sample, mm/s.
-    pub fn speed_mm_s(&self) -> f64 {
-        self.speed_mm_s
     }
 }
 
@@ -242,11 +233,11 @@ mod tests {
             if tick == 3 * 13_200 {
                 hand.intend(0.5, 20.0);
             }
-            let force = hand.indentation_mm().max(0.0);
+            let force = hand.indentation_mm.max(0.0);
             hand.tick(force);
             if tick > 43_400 {
                 forces.push(force);
-                speeds.push(hand.speed_mm_s());
+                speeds.push(hand.speed_mm_s);
             }
         }
         (forces, speeds)

@@ -8,7 +8,7 @@ use super::conditions::{TICK_S, TICKS_PER_S};
 use super::noise::Noise;
 
 /// P_AC of a recording, Hz.
-pub const PAC_HZ: u32 = 2200;
+pub(crate) const PAC_HZ: u32 = 2200;
 /// Tangential force of a recording, Hz.
 pub const SHEAR_HZ: u32 = 100;
 
@@ -21,7 +21,7 @@ const STREAM: u64 = 700;
 /// A recorded slide, from where the finger is pressed and moves.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Played {
-    /// P_AC at [`PAC_HZ`], counts about the still finger's.
+    /// P_AC at 2200 Hz, counts about the still finger's.
     pub pac: Vec<i16>,
     /// Tangential force against the motion at [`SHEAR_HZ`], mN.
     pub shear_mn: Vec<i16>,
@@ -38,7 +38,6 @@ pub struct PlayCounts {
     pub over: u32,
 }
 
-/// A recording that is being played.
 struct Playing {
     slide: usize,
     /// since the movement began
@@ -47,7 +46,6 @@ struct Playing {
     sampled_at: Option<f64>,
 }
 
-/// The recordings, and where they are.
 pub(super) struct Playback {
     slides: Vec<Played>,
     next: usize,

@@ -9,9 +9,9 @@ use super::finger::Finger;
 use super::noise::Noise;
 
 /// Shortest time from the end of a command to the read of its answer, ns (SPM 8.3.1.1).
-pub const GAP_NS: u64 = 50_000;
+pub(crate) const GAP_NS: u64 = 50_000;
 /// Time from power-up to the first command that is understood, ns (LIB).
-pub const POWER_UP_NS: u64 = 100_000_000;
+pub(crate) const POWER_UP_NS: u64 = 100_000_000;
 /// Time without clock that ends the streaming mode, ns (SPM: 5 s).
 const STREAMING_NS: u64 = 5_000_000_000;
 
@@ -57,12 +57,10 @@ pub struct SensorPeer {
     electrodes: [f64; 19],
     serial: [u8; PROPERTY_LEN],
     /// when power came; `None` while unplugged
-    powered_ns: Option<u64>,
+    pub(super) powered_ns: Option<u64>,
     pending: Option<Reply>,
-    /// end of the last select
     ended_ns: u64,
     streaming: bool,
-    flip: u16,
     /// of this select: whether the sensor heard it, after how long, the bytes so far, the answer
     on: bool,
     quiet_ns: u64,
@@ -74,7 +72,7 @@ pub struct SensorPeer {
 
 impl SensorPeer {
     /// A sensor that gets its power at time 0.
-    pub fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         let mut noise = Noise::new(seed, 600);
         let electrodes = std::array::from_fn(|_| noise.between(ELECTRODE_REST.0, ELECTRODE_REST.1));
         let mut serial = *b"BT000000SIMULATE";
@@ -89,7 +87,6 @@ impl SensorPeer {
             pending: None,
             ended_ns: 0,
             streaming: false,
-            flip: 0,
             on: false,
             quiet_ns: 0,
             bytes: 0,
@@ -109,13 +106,8 @@ impl SensorPeer {
         self.streaming
     }
 
-    /// Returns true if it has power.
-    pub fn is_plugged(&self) -> bool {
-        self.powered_ns.is_some()
-    }
-
     /// Pulls the plug.
-    pub fn unplug(&mut self) {
+    pub(super) fn unplug(&mut self) {
         self.powered_ns = None;
         self.pending = None;
         self.streaming = false;
@@ -125,20 +117,15 @@ impl SensorPeer {
     }
 
     /// Plugs it in again.
-    pub fn plug(&mut self, now_ns: u64) {
+    pub(super) fn plug(&mut self, now_ns: u64) {
         self.powered_ns.get_or_insert(now_ns);
-    }
-
-    /// Flips these bits of the next word, first byte high: a disturbed line.
-    pub fn flip_bits(&mut self, bits: u16) {
-        self.flip = bits;
     }
 
     /// Chip select falls. A sample is taken at the command, and read at the next select.
     ///
     /// A command while an answer waits starts anew (chosen: a host that restarts between the two is then in step
     /// again).
-    pub fn select(&mut self, now_ns: u64) {
+    pub(super) fn select(&mut self, now_ns: u64) {
         self.quiet_ns = now_ns.saturating_sub(self.ended_ns);
         self.on = self
             .powered_ns
@@ -149,7 +136,7 @@ impl SensorPeer {
 
     /// Takes a byte. The first one sets the answer: [`SensorPeer::line`]. The sample of a command is taken `fraction`
     /// of a tick after the last but one.
-    pub fn byte(&mut self, mosi: u8, finger: &mut Finger, fraction: f64) {
+    pub(super) fn byte(&mut self, mosi: u8, finger: &mut Finger, fraction: f64) {
         self.bytes += 1;
         match self.bytes {
             1 => self.first(mosi, finger, fraction),
@@ -159,20 +146,21 @@ impl SensorPeer {
     }
 
     /// The sensor's bytes in this period of chip select; later ones float.
-    pub fn line(&mut self) -> &mut [u8; PROPERTY_LEN] {
+    pub(super) fn line(&mut self) -> &mut [u8; PROPERTY_LEN] {
         &mut self.line
     }
 
     /// Chip select rises.
-    pub fn deselect(&mut self, now_ns: u64) {
+    pub(super) fn deselect(&mut self, now_ns: u64) {
         if self.asked_property {
             self.obey_property(0);
         }
         self.ended_ns = now_ns;
     }
 
-    /// One period of chip select as a whole, from `now_ns` on: sends `mosi`, and fills `miso` with the answer.
-    pub fn transfer(
+    /// One period of chip select as a whole, for tests, from `now_ns` on: sends `mosi`, and fills `miso` with the answer.
+    #[cfg(test)]
+    pub(super) fn transfer(
         &mut self,
         now_ns: u64,
         duration_ns: u64,
@@ -227,12 +215,7 @@ impl SensorPeer {
                 if let [ERROR, why] = *word {
                     *self.complaints.entry(why).or_default() += 1;
                 }
-                let flipped = (u16::from_be_bytes(*word) ^ self.flip).to_be_bytes();
-                self.flip = 0;
-                self.line
-                    .iter_mut()
-                    .zip(flipped)
-                    .for_each(|(to, from)| *to = from);
+                self.line[..2].copy_from_slice(word);
             }
             Reply::Property(text) => self.line = *text,
         }
@@ -256,8 +239,8 @@ impl SensorPeer {
     /// Samples a channel (SPM table 7).
     fn sample(&mut self, channel: u8, finger: &mut Finger, fraction: f64) -> Reply {
         let value = match channel {
-            0 => finger.sample_pac(fraction),
-            1 => finger.sample_pdc(fraction),
+            0 => finger.sample_channel(0, fraction),
+            1 => finger.sample_channel(1, fraction),
             2 => self.slow(TAC_REST),
             3 => self.slow(TDC_REST),
             15 => HALL,

@@ -23,7 +23,7 @@ pub struct Transfer {
     /// Its falling edge, and the time that it stays low, ns.
     pub begins_ns: u64,
     /// See [`Transfer::begins_ns`].
-    pub takes_ns: u64,
+    pub(crate) takes_ns: u64,
 }
 
 /// A finger, as a probe reads it.

@@ -11,7 +11,7 @@
 //! ```
 //! The two are solved together for the speed at the end of the tick, so that a steady speed is exact. That is a bridge
 //! which shorts the motor while its PWM is low (*slow decay*), as the parts list wants it. One that is off meanwhile
-//! (*fast decay*) lets the current run back into the supply and then stop: [`Stage::decay_fast`].
+//! (*fast decay*) lets the current run back into the supply and then stop: `decays_fast`.
 
 use std::f64::consts::TAU;
 
@@ -24,42 +24,42 @@ use super::ripple::{self, PwmPhase};
 pub const SUPPLY_V: f64 = 12.0;
 /// Motor, leads, shunt and bridge, ohm (chosen, like a 24 V motor of 23 mm: 7.1 ohm and 26.1 mNm/A), so that a jammed
 /// stage draws 1.6 A, which the amplifier still measures.
-pub const RESISTANCE_OHM: f64 = 7.5;
+pub(crate) const RESISTANCE_OHM: f64 = 7.5;
 /// Torque per current, Nm/A (chosen, see above).
-pub const TORQUE_NM_PER_A: f64 = 0.0261;
+pub(crate) const TORQUE_NM_PER_A: f64 = 0.0261;
 /// Inductance over resistance of the motor, s (facts of the motor chosen above).
-pub const TIME_CONSTANT_S: f64 = 35e-6;
+pub(crate) const TIME_CONSTANT_S: f64 = 35e-6;
 /// Period of the bridge's PWM, s.
-pub const PWM_S: f64 = 50e-6;
+pub(crate) const PWM_S: f64 = 50e-6;
 /// Way of the stage per revolution of the screw, mm (chosen).
-pub const LEAD_MM: f64 = 10.0;
+pub(crate) const LEAD_MM: f64 = 10.0;
 /// Force per current, N/A, and back-EMF per speed, V s/m: 16.4.
 pub const FORCE_N_PER_A: f64 = TAU * TORQUE_NM_PER_A / (LEAD_MM * 1e-3);
 /// Table and sample, 0.8 kg, and rotor and screw, 1.1e-6 kg m^2, as seen through the screw (chosen).
-pub const MASS_KG: f64 = 0.8 + 1.1e-6 * (TAU / (LEAD_MM * 1e-3)) * (TAU / (LEAD_MM * 1e-3));
+pub(crate) const MASS_KG: f64 = 0.8 + 1.1e-6 * (TAU / (LEAD_MM * 1e-3)) * (TAU / (LEAD_MM * 1e-3));
 /// Coulomb friction of the moving stage, N (chosen): 37 mA.
-pub const COULOMB_N: f64 = 0.6;
+pub(crate) const COULOMB_N: f64 = 0.6;
 /// Friction of the standing stage in units of [`COULOMB_N`], falling to 1 over [`STRIBECK_MM_S`] (chosen).
-pub const BREAKAWAY: f64 = 1.2;
+pub(crate) const BREAKAWAY: f64 = 1.2;
 /// Speed over which the friction of rest is lost, mm/s (chosen; well below the slowest slide).
-pub const STRIBECK_MM_S: f64 = 1.0;
+pub(crate) const STRIBECK_MM_S: f64 = 1.0;
 /// Viscous friction, N s/m (chosen): 0.2 N at 100 mm/s.
-pub const VISCOUS_N_S_PER_M: f64 = 2.0;
+pub(crate) const VISCOUS_N_S_PER_M: f64 = 2.0;
 /// Variation of the Coulomb friction over the travel: share, and wavelength in mm (chosen): once per revolution of the
 /// screw, and over its length.
-pub const FRICTION_WAVES: [(f64, f64); 2] = [(0.02, LEAD_MM), (0.02, 63.0)];
+pub(crate) const FRICTION_WAVES: [(f64, f64); 2] = [(0.02, LEAD_MM), (0.02, 63.0)];
 /// Standard deviation of the Coulomb friction from trial to trial, share (chosen).
-pub const FRICTION_SPREAD: f64 = 0.01;
+pub(crate) const FRICTION_SPREAD: f64 = 0.01;
 /// Current ripple: the torque constant falls and rises by this share (chosen)...
-pub const RIPPLE: f64 = 0.02;
+pub(crate) const RIPPLE: f64 = 0.02;
 /// ... this often per revolution, by commutation (5 segments).
-pub const RIPPLES_PER_TURN: f64 = 10.0;
+pub(crate) const RIPPLES_PER_TURN: f64 = 10.0;
 
 /// A stage that vibrates lifts and lowers the sample so often per revolution of the screw, with these shares of the
 /// amplitude (chosen): the screw's runout, the commutation (100 Hz at 100 mm/s), the nut's thread.
-pub const VIBRATIONS: [(f64, f64); 3] = [(1.0, 1.0), (RIPPLES_PER_TURN, 0.3), (32.0, 0.1)];
-/// Speed at which [`Stage::vibrate`] gives the amplitude, mm/s; at others it is in proportion.
-pub const VIBRATION_MM_S: f64 = 100.0;
+pub(crate) const VIBRATIONS: [(f64, f64); 3] = [(1.0, 1.0), (RIPPLES_PER_TURN, 0.3), (32.0, 0.1)];
+/// Speed at which a vibration has its amplitude, mm/s; at others it is in proportion.
+pub(crate) const VIBRATION_MM_S: f64 = 100.0;
 
 /// Way between the hard stops, mm (chosen). Positions count from the lower one.
 pub const TRAVEL_MM: f64 = 85.0;
@@ -69,23 +69,23 @@ pub const SAMPLE_AT_MM: f64 = 5.0;
 pub const SAMPLE_MM: f64 = 75.0;
 /// Distance from each hard stop at which its limit switch closes, mm: 1 mm beyond the sample (chosen). From 100 mm/s a
 /// shorted motor runs on for 3 mm, a reversed one for 0.3.
-pub const LIMIT_MM: f64 = 4.0;
+pub(crate) const LIMIT_MM: f64 = 4.0;
 /// Way between closing and opening of a limit switch, mm (chosen).
-pub const LIMIT_HYSTERESIS_MM: f64 = 0.1;
+pub(crate) const LIMIT_HYSTERESIS_MM: f64 = 0.1;
 
 /// Current amplifier: 20 V/V over 50 mohm (INA240A1), its output at half the reference without current.
-pub const ADC_V_PER_A: f64 = 1.0;
+pub(crate) const ADC_V_PER_A: f64 = 1.0;
 /// Reference of the 12-bit converter, V.
-pub const ADC_REFERENCE_V: f64 = 3.3;
+pub(crate) const ADC_REFERENCE_V: f64 = 3.3;
 /// L/R of a resistor in the place of the motor, s (chosen: 22 ohm of wire, and a metre of cable).
-pub const RESISTOR_TIME_CONSTANT_S: f64 = 0.1e-6;
+pub(crate) const RESISTOR_TIME_CONSTANT_S: f64 = 0.1e-6;
 /// A hand pushes the stage at this speed, mm/s (chosen).
-pub const HAND_MM_S: f64 = 30.0;
+pub(crate) const HAND_MM_S: f64 = 30.0;
 
 /// Noise of a reading, counts rms (chosen).
-pub const ADC_NOISE_COUNTS: f64 = 1.5;
+pub(crate) const ADC_NOISE_COUNTS: f64 = 1.5;
 /// Largest error of the zero, counts, and of the gain (chosen; offset of amplifier and resistors, shunt of 0.5 %).
-pub const ADC_ERRORS: (f64, f64) = (8.0, 0.005);
+pub(crate) const ADC_ERRORS: (f64, f64) = (8.0, 0.005);
 /// Stream of the seeds that the stage draws from.
 const STREAM: u64 = 0x57a6;
 
@@ -93,23 +93,26 @@ const STREAM: u64 = 0x57a6;
 #[derive(Clone, Debug)]
 pub struct Stage {
     duty: f64,
-    enabled: bool,
-    jammed: bool,
-    decays_fast: bool,
+    /// the bridge's enable: without it the motor has no current and the stage coasts
+    pub(super) enabled: bool,
+    /// something holds it (fault)
+    pub(super) jammed: bool,
+    /// the bridge is off while its PWM is low (a bridge, or a setting of it, that the parts list warns of)
+    pub(super) decays_fast: bool,
     /// in the place of the motor, ohm
-    resistor: Option<f64>,
-    /// where a hand pushes it to
+    pub(super) resistor: Option<f64>,
     pushed_mm: Option<f64>,
-    /// amplitude of its vibration, um
-    vibration_um: f64,
-    /// at the end of the last tick, and at its begin
-    position_mm: f64,
+    /// amplitude of the sample's way up and down at [`VIBRATION_MM_S`], um; the paper's stage does not vibrate
+    pub(super) vibration_um: f64,
+    /// from the lower hard stop, at the end of the last tick, and at its begin
+    pub(super) position_mm: f64,
     position_before_mm: f64,
-    speed_mm_s: f64,
-    current_a: f64,
+    pub(super) speed_mm_s: f64,
+    /// of the motor; positive drives to higher positions
+    pub(super) current_a: f64,
     limits: (bool, bool),
-    /// switches that a finger holds
-    held: (bool, bool),
+    /// switches that a person holds actuated
+    pub(super) held: (bool, bool),
     friction_scale: f64,
     friction_phase: [f64; 2],
     ripple_phase: f64,
@@ -163,7 +166,7 @@ impl Stage {
     }
 
     /// Duty of the bridge, -1 to 1; positive drives to higher positions. 0 shorts the motor, which brakes it.
-    pub fn set_duty(&mut self, duty: f64) {
+    pub(crate) fn set_duty(&mut self, duty: f64) {
         self.duty = if duty.is_finite() {
             duty.clamp(-1.0, 1.0)
         } else {
@@ -171,32 +174,11 @@ impl Stage {
         };
     }
 
-    /// The bridge's enable: without it the motor has no current and the stage coasts.
-    pub fn enable(&mut self, on: bool) {
-        self.enabled = on;
-    }
-
-    /// Holds the stage, or lets it go (fault).
-    pub fn jam(&mut self, jammed: bool) {
-        self.jammed = jammed;
-    }
-
-    /// From now on the bridge is off while its PWM is low (a bridge, or a setting of it, that the parts list warns of).
-    pub fn decay_fast(&mut self, fast: bool) {
-        self.decays_fast = fast;
-    }
-
-    /// Puts a resistor of so many ohm in the place of the motor, or the motor back.
-    pub fn replace_motor(&mut self, ohm: Option<f64>) {
-        self.resistor = ohm;
-    }
-
     /// A hand pushes the stage to a place, and leaves it there.
     pub fn push(&mut self, to_mm: f64) {
         self.pushed_mm = Some(to_mm.clamp(0.0, TRAVEL_MM));
     }
 
-    /// A tick in which a hand pushes it.
     fn follow_hand(&mut self, to_mm: f64) {
         self.position_before_mm = self.position_mm;
         let most_mm = HAND_MM_S * TICK_S;
@@ -291,14 +273,8 @@ impl Stage {
         self.switch_limits();
     }
 
-    /// From now on it vibrates while it moves: amplitude of the sample's way up and down at [`VIBRATION_MM_S`], um. The
-    /// paper's stage does not.
-    pub fn vibrate(&mut self, um: f64) {
-        self.vibration_um = um;
-    }
-
     /// Height of the sample above its place on a stage that does not vibrate, mm.
-    pub fn heave_mm(&self) -> f64 {
+    pub(crate) fn heave_mm(&self) -> f64 {
         let amplitude_um = self.vibration_um * self.speed_mm_s.abs() / VIBRATION_MM_S;
         if amplitude_um == 0.0 {
             return 0.0;
@@ -310,40 +286,20 @@ impl Stage {
         amplitude_um * 1e-3 * waves.iter().sum::<f64>()
     }
 
-    /// Position at the end of the last tick, mm from the lower hard stop.
-    pub fn position_mm(&self) -> f64 {
-        self.position_mm
-    }
-
     /// Position within the last tick: 0 is its begin, 1 its end.
-    pub fn position_at_mm(&self, fraction: f64) -> f64 {
+    pub(crate) fn position_at_mm(&self, fraction: f64) -> f64 {
         self.position_before_mm + (self.position_mm - self.position_before_mm) * fraction
     }
 
     /// Place of the finger on the sample, mm from its edge. The last point of a sample continues to the hard stop: a
     /// finger never falls off the edge.
-    pub fn on_sample_mm(&self) -> f64 {
+    pub(crate) fn on_sample_mm(&self) -> f64 {
         (self.position_mm - SAMPLE_AT_MM).clamp(0.0, SAMPLE_MM)
-    }
-
-    /// Speed at the end of the last tick, mm/s.
-    pub fn speed_mm_s(&self) -> f64 {
-        self.speed_mm_s
-    }
-
-    /// Motor current, A; positive drives to higher positions.
-    pub fn current_a(&self) -> f64 {
-        self.current_a
     }
 
     /// The limit switches at the lower and the upper end.
     pub fn limits(&self) -> (bool, bool) {
         (self.limits.0 || self.held.0, self.limits.1 || self.held.1)
-    }
-
-    /// A finger holds its switches actuated, or not.
-    pub fn hold_limits(&mut self, lower: bool, upper: bool) {
-        self.held = (lower, upper);
     }
 
     /// Reading of the converter for the mean current at a time: two readings at the same time are the same.
@@ -352,7 +308,7 @@ impl Stage {
     }
 
     /// Reading of the converter at this place in a period of the bridge's PWM.
-    pub fn adc_within(&self, now_ns: u64, phase: PwmPhase) -> u16 {
+    pub(crate) fn adc_within(&self, now_ns: u64, phase: PwmPhase) -> u16 {
         self.reading(self.current_a + self.ripple_a(phase), now_ns)
     }
 

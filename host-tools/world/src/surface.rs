@@ -7,9 +7,9 @@ use super::noise::Noise;
 use super::textures::{CLAMPED_N, Texture};
 
 /// Length of a sample, mm (PAPER: squares of 75 mm).
-pub const LENGTH_MM: f64 = 75.0;
+pub(crate) const LENGTH_MM: f64 = 75.0;
 /// Distance of the profile's points, mm (chosen: half of what the finest asperities need).
-pub const POINT_MM: f64 = 0.005;
+pub(crate) const POINT_MM: f64 = 0.005;
 /// Points of the profile: a power of two that covers the sample and half a contact patch at either end.
 const POINTS: usize = 1 << 14;
 /// Beginning of the profile, mm: it covers -3.46 .. 78.46 mm.
@@ -28,9 +28,9 @@ const SLOW_MM: f64 = 1.0;
 
 /// Load and speed at which a texture's friction is quoted, N and mm/s (chosen: the force that suits traction best in
 /// the paper, and the middle of its speeds).
-pub const FRICTION_AT: (f64, f64) = (1.26, 25.1);
+pub(crate) const FRICTION_AT: (f64, f64) = (1.26, 25.1);
 /// Load and speed at which its vibrations are, N and mm/s (chosen: the paper's movement between the others).
-pub const VIBRATIONS_AT: (f64, f64) = (0.5, 25.1);
+pub(crate) const VIBRATIONS_AT: (f64, f64) = (0.5, 25.1);
 /// Lowest load and speed of the laws of both, N and mm/s (chosen: below them they stay as they are there).
 const LAWS_FROM: (f64, f64) = (0.05, 5.0);
 /// Distance from the quoted point at which the laws bend, in ln(speed) (chosen: about over the speeds of the paper's
@@ -87,14 +87,15 @@ fn bent(power: f64, bend: f64, speed: f64) -> f64 {
 
 /// One sample of a texture, 75 mm long in the direction of the slide.
 #[derive(Clone, Debug)]
-pub struct Surface {
-    texture: Texture,
-    /// heights, um
+pub(crate) struct Surface {
+    pub(super) texture: Texture,
+    /// heights, um: the skin feels those that it follows
+    #[cfg(test)]
     height: Vec<f32>,
     /// the part of them that the skin follows, um: looked up all the time, so that its length is known while compiling
     followed: Box<[f32; POINTS]>,
     /// rms of the part that it does not follow, um
-    unresolved_um: f64,
+    pub(super) unresolved_um: f64,
     /// friction relative to the texture's, every [`SLOW_MM`]
     friction: Vec<f64>,
     /// amplitude relative to the texture's, every [`SLOW_MM`]
@@ -103,7 +104,7 @@ pub struct Surface {
 
 impl Surface {
     /// Cuts a sample of `texture`, as heterogeneous as [`Conditions::variation`](super::Conditions::variation) has it.
-    pub fn new(texture: &Texture, seed: u64, variation: f64) -> Self {
+    pub(crate) fn new(texture: &Texture, seed: u64, variation: f64) -> Self {
         let mut noise = Noise::new(seed, 1000 + u64::from(texture.number));
         let deviation = variation * texture.heterogeneity;
         let amplitude = wandering(&mut noise, deviation);
@@ -136,6 +137,7 @@ impl Surface {
         let unresolved_um = (rest.sum::<f64>() / POINTS as f64).sqrt();
         Self {
             texture: texture.clone(),
+            #[cfg(test)]
             height,
             followed: followed.try_into().expect("a profile has so many points"),
             unresolved_um,
@@ -144,13 +146,9 @@ impl Surface {
         }
     }
 
-    /// The texture of which this is a sample.
-    pub fn texture(&self) -> &Texture {
-        &self.texture
-    }
-
     /// Height at `x_mm` along the sample, um about its mean.
-    pub fn height_um(&self, x_mm: f64) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn height_um(&self, x_mm: f64) -> f64 {
         let (i, rest) = place(x_mm);
         let [a, b] = [0, 1].map(|k| f64::from(self.height[(i + k) % POINTS]));
         a + (b - a) * rest
@@ -158,23 +156,13 @@ impl Surface {
 
     /// Coefficient of kinetic friction of the skin at `x_mm`, sliding at `speed_mm_s` under `load_n`: a power law of
     /// both.
-    pub fn friction(&self, x_mm: f64, speed_mm_s: f64, load_n: f64) -> f64 {
+    pub(crate) fn friction(&self, x_mm: f64, speed_mm_s: f64, load_n: f64) -> f64 {
         self.texture.friction * slow(&self.friction, x_mm) * self.texture.law(speed_mm_s, load_n)
-    }
-
-    /// Thickness of the sample, mm.
-    pub fn thickness_mm(&self) -> f64 {
-        self.texture.thickness_mm
     }
 
     /// Local amplitude of heights relative to the whole sample's.
     pub(super) fn amplitude(&self, x_mm: f64) -> f64 {
         slow(&self.amplitude, x_mm)
-    }
-
-    /// Rms of the asperities that the skin does not follow, um.
-    pub(super) fn unresolved_um(&self) -> f64 {
-        self.unresolved_um
     }
 
     /// Mean height, um, that the skin follows about `x_mm`, with the pressure of a Hertz contact `half_mm` to either

@@ -7,26 +7,27 @@
 mod names;
 mod recipes;
 
-pub use names::{Group, Named, TEXTURES};
+#[cfg(test)]
+pub(crate) use names::Group;
+pub use names::{Named, TEXTURES};
 
 use super::lever::{LIMIT_MM, TOP_MM};
 use super::maths::{pow, square};
 use super::noise::Noise;
 use recipes::recipe;
 
-/// The periodic part of a surface.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Weave {
+pub(crate) struct Weave {
     /// Period, mm.
-    pub wavelength_mm: f64,
+    pub(crate) wavelength_mm: f64,
     /// Rms height of all harmonics together, um.
-    pub rms_um: f64,
+    pub(crate) rms_um: f64,
     /// Relative deviation of one period from the next.
     pub jitter: f64,
     /// Number of its harmonics.
-    pub harmonics: u32,
+    pub(crate) harmonics: u32,
     /// Their amplitudes fall as 1/k to this power.
-    pub falloff: f64,
+    pub(crate) falloff: f64,
 }
 
 /// Longest wavelength of the relief relative to the one from which it is flat (chosen).
@@ -37,49 +38,49 @@ const LONGEST: f64 = 2.0;
 pub struct Texture {
     /// Its number in Table 1.
     pub number: u8,
-    /// Coefficient of kinetic friction against the skin's silicone at [`super::surface::FRICTION_AT`].
+    /// Coefficient of kinetic friction against the skin's silicone at `FRICTION_AT`.
     pub friction: f64,
     /// Friction goes with load to this power: about -1/3 for smooth surfaces (Hertz), 0 for rough ones (Amontons).
-    pub friction_load: f64,
+    pub(crate) friction_load: f64,
     /// Friction goes with speed to this power.
-    pub friction_speed: f64,
+    pub(crate) friction_speed: f64,
     /// Half the curvature of ln(friction) over ln(speed).
-    pub friction_bend: f64,
+    pub(crate) friction_bend: f64,
     /// By how much static friction exceeds kinetic friction, relative.
-    pub stiction: f64,
+    pub(crate) stiction: f64,
     /// Rms of the 1/f fluctuation of friction, relative to it.
-    pub friction_noise: f64,
+    pub(crate) friction_noise: f64,
     /// Rms height of the finest asperities, um.
-    pub fine_um: f64,
+    pub(crate) fine_um: f64,
     /// Wavelength about which they lie, mm.
-    pub fine_mm: f64,
+    pub(crate) fine_mm: f64,
     /// Centre of the spectrum of the impulses with which those asperities catch and release at the load of
-    /// [`super::surface::VIBRATIONS_AT`], Hz: hard ones are short.
-    pub impulse_hz: f64,
+    /// `VIBRATIONS_AT`, Hz: hard ones are short.
+    pub(crate) impulse_hz: f64,
     /// It goes with load to this power: the contact of an asperity grows as it is pressed, or its edge gets steeper.
-    pub impulse_load: f64,
+    pub(crate) impulse_load: f64,
     /// Half the curvature of its ln over ln(speed): at other speeds others of the asperities catch.
-    pub impulse_bend: f64,
+    pub(crate) impulse_bend: f64,
     /// Rms height of the random relief, um.
-    pub relief_um: f64,
+    pub(crate) relief_um: f64,
     /// Wavelength above which its spectrum is flat, mm.
-    pub relief_mm: f64,
+    pub(crate) relief_mm: f64,
     /// Power density of the relief falls with spatial frequency to this power.
-    pub relief_exponent: f64,
+    pub(crate) relief_exponent: f64,
     /// The periodic part, if it has one.
-    pub weave: Option<Weave>,
+    pub(crate) weave: Option<Weave>,
     /// Share of the vibrations that the material swallows, 0..1.
-    pub damping: f64,
+    pub(crate) damping: f64,
     /// Vibrations fall as 1 / (1 + F / this), N: soon where the skin is soon clamped, later where it sinks in.
-    pub clamped_n: f64,
+    pub(crate) clamped_n: f64,
     /// Vibrations of catching asperities and of friction go with speed to this power beyond what all textures' do.
-    pub vibration_speed: f64,
+    pub(crate) vibration_speed: f64,
     /// Half the curvature of ln(vibrations) over ln(speed).
-    pub vibration_bend: f64,
+    pub(crate) vibration_bend: f64,
     /// Deviation of ln(local height amplitude) over the sample.
-    pub heterogeneity: f64,
+    pub(crate) heterogeneity: f64,
     /// Thickness, mm; at most `FITS_MM`.
-    pub thickness_mm: f64,
+    pub(crate) thickness_mm: f64,
     /// Compliance under the finger, mm/N.
     pub compliance_mm_per_n: f64,
 }

@@ -45,52 +45,29 @@ const FLOATING_COUNTS: f64 = 372.0;
 /// Reading of the converter without current, counts.
 const MIDDLE_COUNTS: f64 = 2048.0;
 
-/// The wires of a rig, without those of the lever and the encoder.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Wires {
-    pub(super) data_exchanged: bool,
-    pub(super) select_open: bool,
-    limits_exchanged: bool,
-    /// lower, upper, lever
-    pub(super) normally_open: [bool; 3],
-    pub(super) stop_bridged: bool,
-    pub(super) stop_keeps_supply: bool,
-    motor_reversed: bool,
-    exchanged_bridge: bool,
-    pub(super) enable_open: bool,
-    gain: f64,
-    current_open: bool,
-}
-
-impl Default for Wires {
-    fn default() -> Self {
-        Self {
-            data_exchanged: false,
-            select_open: false,
-            limits_exchanged: false,
-            normally_open: [false; 3],
-            stop_bridged: false,
-            stop_keeps_supply: false,
-            motor_reversed: false,
-            exchanged_bridge: false,
-            enable_open: false,
-            gain: 1.0,
-            current_open: false,
-        }
-    }
-}
+/// The mistakes in the wires of a rig; those of the lever and of the encoder are theirs.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Wires(Vec<Miswired>);
 
 impl Wires {
+    pub(super) fn take(&mut self, mistake: Miswired) {
+        self.0.push(mistake);
+    }
+
+    pub(super) fn have(&self, mistake: Miswired) -> bool {
+        self.0.contains(&mistake)
+    }
+
     /// Returns true if the sensor hears the chip.
     pub(super) fn reach_sensor(&self) -> bool {
-        !self.data_exchanged && !self.select_open
+        !self.have(Miswired::DataExchanged) && !self.have(Miswired::SelectOpen)
     }
 
     /// The stage's switches at the chip, of those at its lower and at its upper end.
     pub(super) fn limits(&self, (lower, upper): (bool, bool)) -> (bool, bool) {
-        let [lower_open, upper_open, _] = self.normally_open;
-        let (lower, upper) = (lower != lower_open, upper != upper_open);
-        match self.limits_exchanged {
+        let is_open = |upper| self.have(Miswired::LimitNormallyOpen { upper });
+        let (lower, upper) = (lower != is_open(false), upper != is_open(true));
+        match self.have(Miswired::LimitsExchanged) {
             true => (upper, lower),
             false => (lower, upper),
         }
@@ -98,7 +75,7 @@ impl Wires {
 
     /// Duty of the bridge by the PWM's share and by DIR, positive where it drives to higher positions.
     pub(super) fn duty(&self, pwm: f64, dir: bool) -> f64 {
-        match (self.exchanged_bridge, dir) {
+        match (self.have(Miswired::PwmDirExchanged), dir) {
             (false, true) => pwm,
             (false, false) => -pwm,
             // always on, and to and fro with the PWM
@@ -110,7 +87,7 @@ impl Wires {
 
     /// The motor's share of that.
     pub(super) fn motor_duty(&self, duty: f64) -> f64 {
-        match self.motor_reversed {
+        match self.have(Miswired::MotorReversed) {
             true => -duty,
             false => duty,
         }
@@ -118,36 +95,17 @@ impl Wires {
 
     /// Reading of the converter where the book's wires would give `reading`.
     pub(super) fn amplified(&self, reading: u16) -> u16 {
-        if self.current_open {
+        if self.have(Miswired::CurrentOpen) {
             return FLOATING_COUNTS as u16;
         }
         // the bridge's current, and not the motor's
-        let gain = if self.motor_reversed {
-            -self.gain
-        } else {
-            self.gain
-        };
+        let gain = self.0.iter().find_map(|mistake| match mistake {
+            Miswired::CurrentGain(gain) => Some(*gain),
+            _ => None,
+        });
+        let gain = self.motor_duty(gain.unwrap_or(1.0));
         let reading = MIDDLE_COUNTS + gain * (f64::from(reading) - MIDDLE_COUNTS);
         reading.round().clamp(0.0, 4095.0) as u16
-    }
-
-    /// Takes a mistake; those of the lever and of the encoder are theirs.
-    pub(super) fn take(&mut self, mistake: Miswired) {
-        match mistake {
-            Miswired::DataExchanged => self.data_exchanged = true,
-            Miswired::SelectOpen => self.select_open = true,
-            Miswired::LimitsExchanged => self.limits_exchanged = true,
-            Miswired::LimitNormallyOpen { upper } => self.normally_open[usize::from(upper)] = true,
-            Miswired::TopNormallyOpen => self.normally_open[2] = true,
-            Miswired::EStopBridged => self.stop_bridged = true,
-            Miswired::EStopKeepsSupply => self.stop_keeps_supply = true,
-            Miswired::MotorReversed => self.motor_reversed = true,
-            Miswired::PwmDirExchanged => self.exchanged_bridge = true,
-            Miswired::BridgeEnableOpen => self.enable_open = true,
-            Miswired::CurrentGain(gain) => self.gain = gain,
-            Miswired::CurrentOpen => self.current_open = true,
-            Miswired::LeverCoilOpen | Miswired::LeverMicrosteps(_) | Miswired::EncoderLines(_) => {}
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! Inputs are levels, duties and bytes with their time in ns; outputs are the levels of the pins at the time reached.
 //! Nothing here knows the intentions of a controller. [`World::truth`] is for tests and displays only.
 //!
-//! Time: [`World::advance_to`] advances in ticks of 76 us ([`TICKS_PER_S`](super::TICKS_PER_S)). The tick that holds
+//! Time: [`World::advance_to`] advances in ticks of 76 us. The tick that holds
 //! the time reached is computed as a whole, with the inputs as they were at its begin, so that an input acts within
 //! 76 us; outputs between ticks are interpolated. Times may repeat; a time earlier than the last acts now, though the
 //! driver still measures STEP and DIR by it.
@@ -23,7 +23,7 @@ use super::parts::{PartFault, Peers};
 use super::ripple::PwmPhase;
 use super::stage::Stage;
 use super::surface::Surface;
-use super::wiring::Wires;
+use super::wiring::{Miswired, Wires};
 use super::{noise::Noise, textures};
 use tactus_core::sensor::FingerName;
 
@@ -49,7 +49,7 @@ pub struct Setup {
     pub finger: FingerName,
     /// True if [`World::next_encoder_edge`] is going to be asked: edges are kept until then.
     pub keep_edges: bool,
-    /// True if samples lie on shims: those that are thinner than [`World::SHIMMED_MM`] end at that height. The finger's
+    /// True if samples lie on shims: those that are thinner than 11 mm end at that height. The finger's
     /// way down, at 0.5 mm/s, then takes 9 s at most and not up to half a minute.
     pub shimmed: bool,
     /// The world that the texture belongs to; this one, unless given. So one rig slides over more textures than Table
@@ -90,7 +90,7 @@ pub struct Truth {
     /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub indentation_mm: f64,
     /// Steps down that STEP commanded and the lever did not make, less those up.
-    pub lever_missing_steps: f64,
+    pub(crate) lever_missing_steps: f64,
     /// STEP and DIR edges that broke the driver's timing.
     pub lever_bad_pulses: u64,
     /// Place of the stage, mm from its lower hard stop.
@@ -148,7 +148,6 @@ pub struct World {
     sliding_j: f64,
     /// a weight on the inclined stage, N
     pull_n: f64,
-    /// holds the finger in place of lever and stage
     holder: Option<Holder>,
     /// amplitude, g, and frequency, Hz, of what shakes the table under the rig
     table: (f64, f64),
@@ -160,7 +159,7 @@ impl World {
     const POWER_UP_MM: [(f64, f64); 2] = [(12.0, 15.0), (20.0, 65.0)];
     /// Height to which shims bring a sample that is thinner, mm over the plate: a millimetre below the lowest tip at
     /// power-up.
-    pub const SHIMMED_MM: f64 = 11.0;
+    pub(crate) const SHIMMED_MM: f64 = 11.0;
 
     /// A rig just powered up: no current in either motor, the finger in the air.
     pub fn new(setup: Setup) -> Self {
@@ -270,12 +269,13 @@ impl World {
     /// Gives both motors current if they are enabled, unless the emergency stop has taken their supply.
     fn supply_motors(&mut self) {
         let dips = self.now_ns < self.faults.dip_ends_ns;
-        let stopped = self.faults.e_stop.cuts_power() && !self.wires.stop_keeps_supply;
+        let stopped =
+            self.faults.e_stop.cuts_power() && !self.wires.have(Miswired::EStopKeepsSupply);
         let on = !stopped && !dips;
         let (lever, stage) = self.wanted;
         self.lever.enable(lever && on, self.finger.force_n());
-        let open = self.faults.bridge_off || self.wires.enable_open;
-        self.stage.enable(stage && on && !open);
+        let open = self.faults.bridge_off || self.wires.have(Miswired::BridgeEnableOpen);
+        self.stage.enabled = stage && on && !open;
     }
 
     /// Count of the stage's encoder, 1000 per mm, 0 where it stood at power-up.
@@ -320,7 +320,7 @@ impl World {
     fn switches(&self) -> [bool; 3] {
         let (lower, upper) = self.wires.limits(self.stage.limits());
         [
-            self.lever.at_top() != self.wires.normally_open[2],
+            self.lever.at_top() != self.wires.have(Miswired::TopNormallyOpen),
             lower,
             upper,
         ]
@@ -328,37 +328,40 @@ impl World {
 
     /// The emergency stop's contact for the firmware; `true` is open, as when it is pressed.
     pub fn e_stop(&self) -> bool {
-        self.faults.e_stop.is_open(self.now_ns) && !self.wires.stop_bridged
+        self.faults.e_stop.is_open(self.now_ns) && !self.wires.have(Miswired::EStopBridged)
     }
 
     /// The ground truth.
     pub fn truth(&self) -> Truth {
-        let holder = self.holder.as_ref();
+        let [_, sample_mm, speed_mm_s] = match &self.holder {
+            Some(holder) => holder.place(),
+            None => [0.0, self.stage.on_sample_mm(), self.stage.speed_mm_s],
+        };
         Truth {
             at_ns: self.tick_ends_ns,
             texture: self.setup.texture,
             force_n: self.finger.force_n(),
             force_max_n: self.force_max_n,
-            shear_n: self.finger.shear_n(),
-            tip_mm: self.lever.height_mm(),
+            shear_n: self.finger.shear_n,
+            tip_mm: self.lever.height_mm,
             indentation_mm: self.indentation_mm(),
             lever_missing_steps: self.lever.missing_steps(),
-            lever_bad_pulses: self.lever.bad_pulses(),
-            stage_mm: self.stage.position_mm(),
+            lever_bad_pulses: self.lever.bad_pulses,
+            stage_mm: self.stage.position_mm,
             stage_reach_mm: self.stage_reach_mm,
-            sample_mm: holder.map_or_else(|| self.stage.on_sample_mm(), Holder::x_mm),
-            speed_mm_s: holder.map_or_else(|| self.stage.speed_mm_s(), Holder::speed_mm_s),
-            current_a: self.stage.current_a(),
-            mount_mm: self.mount.pushed_mm(),
+            sample_mm,
+            speed_mm_s,
+            current_a: self.stage.current_a,
+            mount_mm: self.mount.pushed_mm,
             sliding_j: self.sliding_j,
-            wear: self.finger.wear(),
+            wear: self.finger.wear,
         }
     }
 
     /// Begins the maxima and the reach of [`Truth`] anew.
     pub fn reset_extremes(&mut self) {
         self.force_max_n = self.finger.force_n();
-        self.stage_reach_mm = (self.stage.position_mm(), self.stage.position_mm());
+        self.stage_reach_mm = (self.stage.position_mm, self.stage.position_mm);
     }
 
     fn inject_at(&mut self, fault: Fault, at_ns: u64, position_mm: f64) {
@@ -375,10 +378,16 @@ impl World {
             Fault::SensorFrozen => faults.frozen = true,
             Fault::PdcDrift { counts_per_s } => faults.drift = Some((counts_per_s, at_ns)),
             Fault::PdcStuck => faults.pdc_stuck = true,
-            Fault::PdcFades { seconds } => self.finger.fade_pdc(seconds),
-            Fault::SkinLeaks { seconds } => self.finger.leak(seconds),
-            Fault::PdcWeak { gain } => self.finger.weaken_pdc(gain),
-            Fault::StageJammed => self.stage.jam(true),
+            Fault::PdcFades { seconds } => {
+                let amplifiers = self.finger.amplifiers();
+                amplifiers.into_iter().for_each(|a| a.fade_pdc(seconds));
+            }
+            Fault::SkinLeaks { seconds } => self.finger.leak_s = Some(seconds),
+            Fault::PdcWeak { gain } => {
+                let amplifiers = self.finger.amplifiers();
+                amplifiers.into_iter().for_each(|a| a.weaken_pdc(gain));
+            }
+            Fault::StageJammed => self.stage.jammed = true,
             Fault::EncoderSwapped => self.encoder.swap(true, position_mm, at_ns),
             Fault::CurrentOffset { amperes } => faults.current = Some(amperes),
             Fault::CurrentSaturated => faults.current = Some(f64::INFINITY),
@@ -390,17 +399,17 @@ impl World {
                 faults.bridge_off = true;
                 self.supply_motors();
             }
-            Fault::FastDecay => self.stage.decay_fast(true),
-            Fault::StageVibrates { um } => self.stage.vibrate(um),
+            Fault::FastDecay => self.stage.decays_fast = true,
+            Fault::StageVibrates { um } => self.stage.vibration_um = um,
             Fault::EncoderCut(cut) => self.encoder.set_cut(Some(cut), position_mm, at_ns),
             Fault::StageLimitStuck { upper, closed } => {
                 faults.switches.stuck[1 + usize::from(upper)] = Some(closed);
             }
             Fault::LeverTopStuck { closed } => faults.switches.stuck[0] = Some(closed),
             Fault::SwitchesBounce { ms } => faults.switches.bounce(now, ms),
-            Fault::LeverLosesSteps { share } => self.lever.lose_steps(share),
+            Fault::LeverLosesSteps { share } => self.lever.lost_share = share,
             Fault::LeverRunaway => self.lever.run_away_down(true),
-            Fault::LeverDirInverted => self.lever.invert_dir(true),
+            Fault::LeverDirInverted => self.lever.inverted = true,
             Fault::EStop => {
                 faults.e_stop.press(at_ns);
                 self.supply_motors();
@@ -413,7 +422,7 @@ impl World {
         self.tick_began_ns = self.tick_ends_ns;
         let began_ns = self.tick_began_ns;
         while let Some((_, fault)) = self.scheduled.pop_if(|(at_ns, _)| *at_ns <= began_ns) {
-            self.inject_at(fault, began_ns, self.stage.position_mm());
+            self.inject_at(fault, began_ns, self.stage.position_mm);
         }
         if (1..=began_ns).contains(&self.faults.dip_ends_ns) {
             self.faults.dip_ends_ns = 0;
@@ -424,15 +433,16 @@ impl World {
         let (whole, rest) = (self.ticks / 33, self.ticks % 33);
         self.tick_ends_ns = whole * 2_500_000 + rest * 2_500_000 / 33;
 
-        let shear_n = self.finger.shear_n();
+        let shear_n = self.finger.shear_n;
         if let Some(holder) = &mut self.holder {
             holder.tick(self.finger.force_n());
-            self.finger.hold(holder.held());
+            self.finger.held = holder.held();
+            let [indentation_mm, x_mm, speed_mm_s] = holder.place();
             self.finger.tick(&Contact {
-                indentation_mm: holder.indentation_mm(),
+                indentation_mm,
                 surface: Some(&self.surface),
-                x_mm: holder.x_mm(),
-                speed_mm_s: holder.speed_mm_s(),
+                x_mm,
+                speed_mm_s,
                 lever_vibration: 0.0,
             });
             self.peers.tick(self.tick_ends_ns, &self.finger);
@@ -444,10 +454,10 @@ impl World {
         let (table_g, hz) = self.table;
         if table_g != 0.0 {
             let turns = hz * self.tick_ends_ns as f64 * 1e-9;
-            self.finger.hold(Held {
+            self.finger.held = Held {
                 acceleration_g: table_g * sin(TAU * turns),
                 ..Held::STILL
-            });
+            };
         }
         self.mount.tick(force_n);
         let [from_mm, to_mm] = self.move_motors(force_n, shear_n);
@@ -455,7 +465,7 @@ impl World {
             indentation_mm: self.indentation_mm(),
             surface: Some(&self.surface),
             x_mm: self.stage.on_sample_mm(),
-            speed_mm_s: self.stage.speed_mm_s(),
+            speed_mm_s: self.stage.speed_mm_s,
             lever_vibration: self.lever.vibration_pa(),
         });
 
@@ -470,9 +480,9 @@ impl World {
     /// goes.
     fn move_motors(&mut self, force_n: f64, shear_n: f64) -> [f64; 2] {
         self.lever.tick(self.tick_ends_ns, force_n);
-        let from_mm = self.stage.position_mm();
+        let from_mm = self.stage.position_mm;
         self.stage.tick(shear_n + self.pull_n);
-        let to_mm = self.stage.position_mm();
+        let to_mm = self.stage.position_mm;
         if from_mm != to_mm {
             self.encoder
                 .pass([from_mm, to_mm], [self.tick_began_ns, self.tick_ends_ns]);
@@ -489,25 +499,25 @@ impl World {
 
     fn indentation_mm(&self) -> f64 {
         if let Some(holder) = &self.holder {
-            return holder.indentation_mm();
+            return holder.place()[0];
         }
         self.over_tip_mm(&self.surface) + self.stage.heave_mm()
     }
 
     /// Height of a sample over the undeformed tip, mm.
     fn over_tip_mm(&self, surface: &Surface) -> f64 {
-        let thickness_mm = surface.thickness_mm();
+        let thickness_mm = surface.texture.thickness_mm;
         let top_mm = if self.setup.shimmed {
             thickness_mm.max(Self::SHIMMED_MM)
         } else {
             thickness_mm
         };
-        top_mm - self.lever.height_mm() - self.mount.pushed_mm()
+        top_mm - self.lever.height_mm - self.mount.pushed_mm
     }
 
     fn must_be_over(&self, surface: &Surface) -> Result<(), NotLifted> {
         let over_mm = self.over_tip_mm(surface);
-        let indentation_mm = self.holder.as_ref().map_or(over_mm, Holder::indentation_mm);
+        let indentation_mm = self.holder.as_ref().map_or(over_mm, |h| h.place()[0]);
         if indentation_mm > 0.0 {
             return Err(NotLifted { indentation_mm });
         }

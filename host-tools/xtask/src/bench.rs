@@ -1,60 +1,29 @@
-//! `cargo xtask bench`: what the kernels cost, counted on the emulated chip; with `--pc`, how long they take on this
-//! PC.
-use std::ffi::OsString;
+//! `cargo xtask bench`: what the kernels cost, counted on the emulated chip.
 use std::process::Command;
 
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use crate::shell::{cargo, run};
+use crate::shell::run;
 use crate::{emulate, firmware};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask bench                  the table for people
-  cargo xtask bench --format json    a list of {kernel, unit, instructions, gate, ok}
-  cargo xtask bench --finger mems    a slot of another finger, and how busy the core is with it
-  cargo xtask bench --pc spectrum    times on this PC of benches with `spectrum` in their name";
+  cargo xtask bench                  the table
+  cargo xtask bench --finger mems    a slot of another finger, and how busy the core is with it";
 
-/// The image that counts.
 const IMAGE: &str = "tactus-silicon";
-/// The one whose load is measured.
 const RIG: &str = "tactus-rig";
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// For people, or JSON for programs
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
     /// Measure the load of the rig's image with another finger alone: analog or mems
-    #[arg(long, value_name = "NAME", conflicts_with = "pc")]
+    #[arg(long, value_name = "NAME")]
     finger: Option<String>,
-    /// Measure times on this PC instead: good for comparing two versions on one PC
-    #[arg(long)]
-    pc: bool,
-    /// With --pc, filter and options for the benches (divan's)
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, requires = "pc")]
-    options: Vec<OsString>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    Text,
-    Json,
 }
 
 pub(crate) fn bench(options: &Options) -> Result<()> {
-    if options.pc {
-        // by target: `cargo bench` alone would hand divan's options to every unit test binary too
-        let mut cargo = cargo();
-        cargo.args(["bench", "--package", "tactus-tests", "--bench", "*", "--"]);
-        return run(cargo.args(&options.options));
-    }
-    let mut program = program(options.finger.as_deref())?;
-    if options.format == Format::Json {
-        program.args(["--format", "json"]);
-    }
-    run(&mut program)
+    run(&mut program(options.finger.as_deref())?)
 }
 
 /// Measures; an error if a gate is missed or a result is not the plain kernels'.

@@ -1,5 +1,4 @@
 //! `cargo xtask campaign`: long checks, and how each of them ended in one sentence.
-mod board;
 mod factory;
 mod fuzz;
 mod seeds;
@@ -12,7 +11,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
-use crate::shell::{cargo, has_subcommand, hear, root, run};
+use crate::shell::{hear, root, run};
 use crate::{emulate, firmware, page};
 pub(crate) use factory::{FOLDER, TABLES};
 
@@ -20,15 +19,11 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask campaign all --book                   everything, a day or two; each result goes into the book
   cargo xtask campaign rig --finger mems            seeds 1 to 20 on the emulated board, with another finger
-  cargo xtask campaign identify --seeds 200-330     every method
-  cargo xtask campaign study --seeds 1-10 -- --simulations 8000
   cargo xtask campaign rig --seeds 1-20 -- --recording 3   slides of a real BioTac under the finger
   cargo xtask campaign faults --seeds 1-2000
   cargo xtask campaign factory -- --write           makes the tables that come with the firmware, shared/tables/*.tact
-  cargo xtask campaign fuzz -- table --seconds 60   one target
-  cargo xtask campaign mutants -- --in-diff my.diff only what a diff touches";
+  cargo xtask campaign fuzz -- table --seconds 60   one target";
 
-/// The page of the book that lists the results.
 const BOOK: &str = "docs/src/tests.md";
 
 #[derive(Args)]
@@ -53,7 +48,6 @@ pub(crate) struct Options {
     options: Vec<OsString>,
 }
 
-/// A part of the campaign.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     /// Every other part, the short ones first
@@ -62,9 +56,7 @@ enum Part {
     Factory,
     /// The page in a browser, with the firmware on the emulated board
     Page,
-    /// The package for the registry, packed, and compiled as others will
-    Package,
-    /// Tests that `cargo xtask test` leaves out, in the workspace and on emulated boards
+    /// Tests that `cargo xtask test` leaves out, and all seeds of the others, in the workspace and on emulated boards
     Tests,
     /// Explorations on the emulated board
     Rig,
@@ -76,26 +68,11 @@ enum Part {
     Faults,
     /// The same on emulated boards, with the firmware
     BoardFaults,
-    /// `tactus study all`, with few simulations
-    Study,
-    /// `tactus identify --simulated`, by every method
-    Identify,
-    /// `tactus simulate`
-    Simulate,
-    /// `tactus learn-by-hand`
-    LearnByHand,
-    /// `tactus verify --simulated`: a texture against itself, and the next one against it
-    Verify,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
     Press,
-    /// libFuzzer against frames, tables, the store's flash, recordings and scenarios, on stable Rust; wants a C++
+    /// libFuzzer against frames, tables, the store's flash and recordings, on stable Rust; wants a C++
     /// compiler
     Fuzz,
-    /// The same with a bug planted in each target, which must be found
-    Planted,
-    /// The core's tests on copies of the core with one thing changed (cargo-mutants): a mutant that survives is seen by
-    /// no test
-    Mutants,
 }
 
 impl Part {
@@ -104,11 +81,9 @@ impl Part {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// The seeds of a part that takes them.
     fn seeds(self, options: &Options) -> Option<RangeInclusive<u64>> {
         let usual = match self {
-            Self::Study | Self::Press => 1..=100,
-            Self::Identify | Self::Simulate | Self::LearnByHand | Self::Verify => 1..=50,
+            Self::Press => 1..=100,
             Self::Rig | Self::Handheld => 1..=20,
             Self::Faults | Self::BoardFaults => 1..=300,
             _ => return None,
@@ -117,7 +92,6 @@ impl Part {
     }
 }
 
-/// Parses `A-B`, or one seed.
 fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
     let (from, to) = text.split_once('-').unwrap_or((text, text));
     match (from.parse(), to.parse()) {
@@ -126,7 +100,6 @@ fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
     }
 }
 
-/// Runs a part, or all of them.
 pub(crate) fn campaign(options: &Options) -> Result<()> {
     let parts = match options.part {
         Part::All => &Part::value_variants()[1..],
@@ -184,7 +157,6 @@ fn in_book(page: &str, part: &str, row: &str) -> Result<String> {
     Ok(lines.collect::<Vec<_>>().join("\n") + "\n")
 }
 
-/// Runs a part, and returns its result in a sentence.
 fn perform(part: Part, options: &Options) -> Result<String> {
     println!("== campaign {}", part.name());
     let seeds = part.seeds(options);
@@ -201,19 +173,16 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     match (part, seeds) {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
         (Part::Page, _) => page::emulated().map(|()| "passed".into()),
-        (Part::Package, _) => package(),
         (Part::Tests, _) => left_out(),
         (Part::Cuts, _) => result(&mut emulate::command("cuts", &options.options)?),
         (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
-        (Part::Planted, _) => fuzz::fuzz(&["--planted", "--seconds", "150"].map(OsString::from)),
-        (Part::Mutants, _) => mutants(&options.options),
-        (_, Some(seeds)) => seeds::run(part, &seeds, options),
+        (Part::Press, Some(seeds)) => seeds::presses(&seeds),
+        (_, Some(seeds)) => seeds::run(part == Part::Handheld, &seeds, options),
         (_, None) => Ok(String::new()),
     }
 }
 
-/// The result of a run of the emulator.
 fn result(emulator: &mut Command) -> Result<String> {
     let mut lines = Vec::new();
     hear(emulator, |line| lines.push(line.to_owned()))?;
@@ -254,49 +223,20 @@ fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<
     result(&mut cases)
 }
 
-/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own.
+/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own, and all others with all of
+/// their seeds.
 fn left_out() -> Result<String> {
-    let ignored = ["--", "--ignored", "--skip", "the_whole_campaign"];
-    let mut board_tests = emulate::tests();
-    let board_tests = emulate::with_images(&mut board_tests, &firmware::elves()?)?;
-    let (mut passed, mut workspace) = (0, cargo());
-    workspace.args(["test", "--release", "--workspace", "--no-fail-fast"]);
-    for tests in [&mut workspace, board_tests] {
-        hear(tests.args(ignored), |line| {
-            let result = line.strip_prefix("test result: ok. ");
-            let count = result.and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
-            passed += count.unwrap_or_default();
-        })?;
-    }
+    let mut passed = 0;
+    let mut tests = emulate::workspace("test");
+    let tests = emulate::with_images(&mut tests, &firmware::elves()?)?;
+    tests.args(["--no-fail-fast", "--", "--include-ignored"]);
+    tests.env("TACTUS_ALL_SEEDS", "1");
+    hear(tests.args(["--skip", "the_whole_campaign"]), |line| {
+        let result = line.strip_prefix("test result: ok. ");
+        let count = result.and_then(|rest| rest.split(' ').next()?.parse::<u64>().ok());
+        passed += count.unwrap_or_default();
+    })?;
     Ok(format!("{passed} tests passed."))
-}
-
-/// Packs and compiles the core, which alone goes to the registry; without the network, as the workspace was built.
-fn package() -> Result<String> {
-    let mut package = cargo();
-    package.args([
-        "package",
-        "--package",
-        "tactus-core",
-        "--allow-dirty",
-        "--offline",
-        "--locked",
-    ]);
-    run(&mut package).map(|()| "The package compiles.".into())
-}
-
-fn mutants(options: &[OsString]) -> Result<String> {
-    if !has_subcommand("mutants") {
-        return Ok("Not run: cargo install cargo-mutants --locked".into());
-    }
-    let mut cargo = cargo();
-    cargo.args(["mutants", "--package", "tactus-core"]);
-    cargo.args(["--test-package", "tactus-core", "--profile", "mutants"]);
-    for module in ["sensor", "table", "explorer"] {
-        cargo.args(["--file", &format!("shared/src/{module}*")]);
-        cargo.args(["--file", &format!("shared/src/{module}*/**")]);
-    }
-    result(cargo.args(options))
 }
 
 #[cfg(test)]

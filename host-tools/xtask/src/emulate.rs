@@ -1,4 +1,4 @@
-//! The emulated board: a workspace of its own, since its crate wants a newer Rust than the others.
+//! The emulated board.
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::Result;
 
 use crate::firmware;
-use crate::shell::{self, cargo, root, target};
+use crate::shell::{self, cargo, target};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -17,9 +17,7 @@ Examples:
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options";
 
-/// The image that every run is of.
 pub(crate) const RIG: &str = "tactus-rig";
-/// The image that a hand holds.
 pub(crate) const HANDHELD: &str = "tactus-handheld";
 /// The image of a probe on somebody else's arm.
 pub(crate) const ARM: &str = "tactus-arm";
@@ -49,7 +47,6 @@ fn value(options: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Builds firmware and emulator, and returns the command of a run.
 pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
@@ -84,39 +81,27 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
 
 /// A run of the emulator, which is built.
 pub(crate) fn program(run: &str) -> Command {
-    let mut emulator = Command::new(folder().join("release/tactus-emulator"));
+    let mut emulator = Command::new(target().join("debug/tactus-emulator"));
     emulator.arg(run);
     emulator
 }
 
-/// Where cargo puts the emulator.
-fn folder() -> PathBuf {
-    target().join("emulator")
-}
-
-/// Builds the emulator.
+/// Builds the emulator, with the features of the whole workspace: as the tests have built it.
 pub(crate) fn build() -> Command {
-    let mut build = cargo_there("build");
-    build.arg("--release");
+    let mut build = workspace("build");
+    build.args(["--bin", "tactus-emulator"]);
     build
 }
 
-/// Lints of the emulator.
-pub(crate) fn lints() -> Command {
-    let mut clippy = cargo_there("clippy");
-    // in release, so that its build scripts and macros are those of the tests
-    clippy.args(["--release", "--all-targets", "--", "-Dwarnings"]);
-    clippy
+/// A cargo command on the whole workspace.
+pub(crate) fn workspace(command: &str) -> Command {
+    let mut cargo = cargo();
+    // rigless declares Rust 1.98, and cranelift below it 1.96: they build with 1.95, which the README names, and these
+    // tests are run with that
+    cargo.args([command, "--workspace", "--locked", "--ignore-rust-version"]);
+    cargo
 }
 
-/// The emulator's tests.
-pub(crate) fn tests() -> Command {
-    let mut tests = cargo_there("test");
-    tests.args(["--release", "--no-fail-fast"]);
-    tests
-}
-
-/// Tests with the images that would be flashed.
 pub(crate) fn with_images<'t>(
     tests: &'t mut Command,
     elves: &[PathBuf],
@@ -132,16 +117,4 @@ pub(crate) fn with_images<'t>(
         tests.env(variable, firmware::image(elves, name)?);
     }
     Ok(tests.env("TACTUS_REQUIRE_ELF", "1"))
-}
-
-/// A cargo command in the emulator's workspace.
-fn cargo_there(command: &str) -> Command {
-    let mut cargo = cargo();
-    // its own configuration is read from there
-    cargo.current_dir(root().join("host-tools/emulator"));
-    // rigless declares Rust 1.98, and cranelift below it 1.96: they build with 1.95, which the README names, and these
-    // tests are run with that
-    cargo.args([command, "--locked", "--ignore-rust-version"]);
-    cargo.arg("--target-dir").arg(folder());
-    cargo
 }

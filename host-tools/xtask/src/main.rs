@@ -56,7 +56,7 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Run a long check or all of them: many explorations, power cuts, faults, fuzzing, mutants
+    /// Run a long check or all of them: many explorations, power cuts, faults, fuzzing
     ///
     /// Each part says in one sentence how it ended; with `all`, or with --book, that sentence is a row of a table. An
     /// error if a part misses a limit.
@@ -72,8 +72,7 @@ enum Cli {
     /// Build the firmware; list each image with its hash, its memory and the rig's deepest stack
     ///
     /// The stack is measured on the emulated board, during an exploration. An error if an image takes more flash or
-    /// variables than it may, or if twice the stack does not fit beside them. Lists the largest symbols, and the
-    /// functions that panic with their callers.
+    /// variables than it may, or if twice the stack does not fit beside them. Lists the functions that panic.
     ///
     /// Builds with the active Rust toolchain if that has the target thumbv7em-none-eabihf
     /// (`rustup target add thumbv7em-none-eabihf`). If it has not, Debian's Rust packages build it, and where those are
@@ -97,8 +96,8 @@ enum Cli {
     /// Make a release: images, command, Python package, page, tables, licences, hash sums, and how to flash without a
     /// checkout
     ///
-    /// An ELF has the symbols that `probe-rs attach` reads the log with; .bin and .hex are the same image for other
-    /// programmers. What this machine cannot build is left out, and said; with CI=true that is an error.
+    /// An ELF has the symbols that `probe-rs attach` reads the log with; .bin is the same image for other programmers.
+    /// What this machine cannot build is left out, and said; with CI=true that is an error.
     #[command(after_help = bundle::EXAMPLES)]
     Bundle(bundle::Options),
 }

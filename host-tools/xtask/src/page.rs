@@ -9,7 +9,7 @@ pub(crate) use check::{check, emulated};
 
 /// Builds the page.
 pub(crate) fn page() -> Result<()> {
-    let built = build()?;
+    let built = build("release")?;
     println!(
         "{}\n{} bytes of WebAssembly",
         built.page.display(),

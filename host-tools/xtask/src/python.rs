@@ -24,13 +24,13 @@ pub(crate) fn check() -> Result<()> {
         Ok(python) => python,
         Err(why) => return skip(&format!("{why:#}")),
     };
-    let manifest = root().join(PACKAGE).join("Cargo.toml");
-    let mut lints = here(cargo());
-    lints.args(["clippy", "--release", "--features", "pyo3/extension-module"]);
-    lints.arg("--manifest-path").arg(&manifest);
-    run(lints.args(["--", "-Dwarnings"]))?;
     println!("== pip install ./{PACKAGE}");
-    run(pip(&python).arg(root().join(PACKAGE)))?;
+    let mut install = pip(&python);
+    install.env("MATURIN_PEP517_ARGS", "--profile tested");
+    // one build for both: clippy compiles the package itself
+    install.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    install.env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
+    run(install.arg(root().join(PACKAGE)))?;
     println!("== pytest {PACKAGE}");
     let command = target().join("debug").join(program("tactus"));
     if !command.is_file() {
@@ -89,12 +89,6 @@ pub(crate) fn wheel() -> Result<PathBuf> {
     let mut files = files.filter_map(|file| Some(file.ok()?.path()));
     let wheel = files.find(|file| file.extension() == Some("whl".as_ref()));
     wheel.with_context(|| format!("pip has left no wheel in {}", out.display()))
-}
-
-/// The workspace of the package has settings of its own.
-fn here(mut cargo: Command) -> Command {
-    cargo.current_dir(root().join(PACKAGE));
-    cargo
 }
 
 /// The Python of `target/python`, with what the tests need.

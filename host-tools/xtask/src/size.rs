@@ -4,10 +4,10 @@ mod panics;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
+use clap::Args;
+use serde_json::Value;
 
-use panics::{Kind, Panic, Symbol, panics, symbols};
+use panics::{Kind, Panic, panics};
 
 use crate::emulate;
 use crate::firmware::{self, Size};
@@ -15,9 +15,8 @@ use crate::shell::run;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask size                   tables for people
-  cargo xtask size --no-stack        without the exploration on the emulated board, which takes some minutes
-  cargo xtask size --format json     everything on one line, for programs";
+  cargo xtask size                   all of it
+  cargo xtask size --no-stack        without the exploration on the emulated board, which takes some minutes";
 
 const KB: u64 = 1024;
 /// Flash of an image, with all tables that come with it: half of the bank that it has, so that compilers have room.
@@ -29,56 +28,36 @@ const MARGIN: u64 = 2;
 const STACK: u64 = 192 * KB - MAX_VARIABLES - 16 * KB;
 /// Images that move the finger, or take slides: nothing of ours panics in them.
 const MOVING: [&str; 3] = ["tactus-rig", "tactus-arm", "tactus-handheld"];
-/// The image whose stack is measured.
 const RIG: &str = "tactus-rig";
 
-#[derive(Args)]
+#[derive(Args, Default)]
 pub(crate) struct Options {
     /// Leave the stack out, and with it the emulated board
     #[arg(long)]
     no_stack: bool,
-    /// For people, or a line of JSON for programs
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    Text,
-    Json,
-}
-
-/// An image and what was measured of it.
 struct Measured {
     name: String,
     size: Size,
-    symbols: Vec<Symbol>,
     panics: Vec<Panic>,
     /// what the emulator says
     stack: Option<Value>,
 }
 
-/// The sizes, and an error if one is over its limit.
+/// The sizes with the stack, and an error if one is over its limit.
 pub(crate) fn gates() -> Result<()> {
-    show(false, Format::Text)
+    size(&Options::default())
 }
 
 pub(crate) fn size(options: &Options) -> Result<()> {
-    show(options.no_stack, options.format)
-}
-
-fn show(no_stack: bool, format: Format) -> Result<()> {
-    let images = measure(no_stack)?;
-    match format {
-        Format::Text => print!("{}", text(&images)),
-        Format::Json => println!("{}", Value::from_iter(images.iter().map(json))),
-    }
+    let images = measure(options.no_stack)?;
+    print!("{}", text(&images));
     let wrong = wrong(&images);
     ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
     Ok(())
 }
 
-/// Builds the images and measures them.
 fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     let mut images = Vec::new();
     for elf in firmware::elves()? {
@@ -93,7 +72,6 @@ fn measure(no_stack: bool) -> Result<Vec<Measured>> {
         images.push(Measured {
             panics: panics(&bytes).with_context(|| name.clone())?,
             size: Size::of(&bytes).with_context(|| name.clone())?,
-            symbols: symbols(&bytes).with_context(|| name.clone())?,
             name,
             stack,
         });
@@ -101,7 +79,6 @@ fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     Ok(images)
 }
 
-/// Measures the stack on the emulated board.
 fn stack(elf: &Path) -> Result<Value> {
     run(&mut emulate::build())?;
     let output = emulate::program("stack")
@@ -119,7 +96,6 @@ fn worst_stack(image: &Measured) -> Option<u64> {
     image.stack.as_ref()?.get("bound")?.as_u64()
 }
 
-/// The limits that an image misses, as far as they were measured.
 fn missed(image: &Measured) -> Vec<String> {
     let Size { flash, ram, .. } = image.size;
     let stack = worst_stack(image);
@@ -151,26 +127,9 @@ fn ours(image: &Measured) -> Vec<String> {
     image.panics.iter().filter(ours).map(said).collect()
 }
 
-/// What is wrong with the images.
 fn wrong(images: &[Measured]) -> Vec<String> {
     let missed = images.iter().flat_map(missed);
     missed.chain(images.iter().flat_map(ours)).collect()
-}
-
-fn json(image: &Measured) -> Value {
-    let symbols = image.symbols.iter();
-    json!({
-        "image": image.name,
-        "flash": image.size.flash,
-        "ram": image.size.ram,
-        "ccm": image.size.ccm,
-        "symbols": Value::from_iter(symbols.map(|s| json!({"bytes": s.bytes, "name": s.name}))),
-        "flash_allowed": MAX_FLASH,
-        "panics": Value::from_iter(image.panics.iter().map(|panic| {
-            json!({"kind": format!("{:?}", panic.kind), "place": panic.place, "function": panic.function})
-        })),
-        "stack": image.stack,
-    })
 }
 
 fn text(images: &[Measured]) -> String {
@@ -205,10 +164,6 @@ fn text(images: &[Measured]) -> String {
         if let Some(stack) = &image.stack {
             line(format_args!("\n{}'s stack, bytes", image.name));
             stack_text(stack, &mut line);
-        }
-        line(format_args!("\n{}'s biggest symbols, bytes", image.name));
-        for symbol in &image.symbols {
-            line(format_args!("{:>7}  {}", symbol.bytes, symbol.name));
         }
         panics_text(image, &mut line);
     }
@@ -253,6 +208,8 @@ fn stack_text(stack: &Value, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     fn panic(kind: Kind) -> Panic {
@@ -267,10 +224,6 @@ mod tests {
         Measured {
             name: RIG.into(),
             size: Size { flash, ram, ccm: 0 },
-            symbols: vec![Symbol {
-                bytes: 4086,
-                name: "session::work".into(),
-            }],
             panics: vec![panic(Kind::Dependency)],
             stack: bound.map(|bound| {
                 let servo = json!({"name": "UART5", "deepest": 1200, "runs": 9});
@@ -310,15 +263,12 @@ mod tests {
     }
 
     #[test]
-    fn people_and_programs_are_told_the_same() {
+    fn sizes_and_panics_are_told() {
         let image = image(160_000, 52_000, Some(9000));
-        assert_eq!(json(&image)["stack"]["bound"], 9000);
-        assert_eq!(json(&image)["symbols"][0]["bytes"], 4086);
         let text = text(&[image]);
         for part in [
             "160000",
             "9000",
-            "4086  session::work",
             "1200  UART5, runs: 9",
             "      1  checks in dependencies",
             "      0  checks of our own",

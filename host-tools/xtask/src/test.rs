@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 
+use crate::emulate::workspace;
 use crate::shell::{SKIP_LOG, cargo, has_subcommand, hear, root, run, target};
 use crate::toolchain::{self, CHIP};
 use crate::{bench, emulate, firmware, page, python, size};
@@ -15,33 +16,25 @@ use crate::{bench, emulate, firmware, page, python, size};
 type Step = (&'static str, fn() -> Result<()>);
 
 /// Two rows of steps for two cores: a build has a long tail of a single thread. Steps of a row use what those before
-/// them have built, and the rows build into folders of their own, so that cargo's locks keep none waiting.
+/// them have built.
 const ROWS: [&[Step]; 2] = [
     &[
         ("formatting", formatting),
         ("lints", lints),
-        ("tests", || {
-            tests(cargo().args(["test", "--workspace", "--no-fail-fast"]))
-        }),
-        ("page", page::check),
-        ("python", python::check),
+        ("tests", all_tests),
         ("documentation", documentation),
     ],
     &[
         ("firmware", firmware::build_all),
-        ("emulator", emulator),
+        ("page", page::check),
+        ("python", python::check),
         ("bench", bench::gates),
         ("size", size::gates),
         ("licences and sources", licences),
     ],
 ];
 /// Workspaces beside the main one.
-pub(crate) const OTHERS: [&str; 4] = [
-    "host-tools/emulator",
-    "host-tools/page",
-    "host-tools/python",
-    "tests/fuzz",
-];
+pub(crate) const OTHERS: [&str; 3] = ["host-tools/page", "host-tools/python", "tests/fuzz"];
 
 fn formatting() -> Result<()> {
     announce(cargo().args(["fmt", "--all", "--check"]))?;
@@ -56,12 +49,12 @@ fn formatting() -> Result<()> {
 }
 
 fn lints() -> Result<()> {
-    announce(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-Dwarnings"]))
+    announce(workspace("clippy").args(["--all-targets", "--", "-Dwarnings"]))
 }
 
 fn documentation() -> Result<()> {
-    let mut doc = cargo();
-    doc.args(["doc", "--workspace", "--no-deps"]);
+    let mut doc = workspace("doc");
+    doc.arg("--no-deps");
     announce(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
 }
 
@@ -74,11 +67,12 @@ fn licences() -> Result<()> {
     announce(cargo().args(["deny", "check", "bans", "licenses", "sources"]))
 }
 
-fn emulator() -> Result<()> {
-    announce(&mut emulate::lints())?;
-    announce(&mut emulate::build())?;
-    let mut board_tests = emulate::tests();
-    tests(emulate::with_images(&mut board_tests, &firmware::elves()?)?)
+/// The tests of the whole workspace, those of the board with the images that would be flashed.
+fn all_tests() -> Result<()> {
+    announce(workspace("test").arg("--no-run"))?;
+    let mut all = workspace("test");
+    all.arg("--no-fail-fast");
+    tests(emulate::with_images(&mut all, &firmware::elves()?)?)
 }
 
 fn announce(command: &mut Command) -> Result<()> {

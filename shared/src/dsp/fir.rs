@@ -4,7 +4,7 @@
 //! were cut into blocks, nor on the machine.
 
 use super::kernels::Kernels;
-use super::plan::{HISTORY, Plan};
+use super::plan::{BAND_PASS, HISTORY, Plan};
 
 /// Samples filtered at once, whole twelves for kernels that take so many. No result depends on it.
 const BLOCK: usize = 264;
@@ -18,14 +18,12 @@ struct Words([i16; HISTORY + BLOCK]);
 pub struct BandPower {
     /// The last `HISTORY` samples before the block, then the block.
     samples: Words,
-    /// The number of samples in the block so far.
     filled: usize,
     energy: u64,
     outputs: u32,
 }
 
 impl Default for BandPower {
-    /// A filter at rest: every earlier sample was 0.
     fn default() -> Self {
         Self {
             samples: Words([0; HISTORY + BLOCK]),
@@ -38,7 +36,7 @@ impl Default for BandPower {
 
 impl BandPower {
     /// Takes samples into the filter's memory without counting their power: what comes before the steady window.
-    pub fn prime(&mut self, plan: &Plan, samples: &[i16]) {
+    pub(crate) fn prime(&mut self, plan: &Plan, samples: &[i16]) {
         self.flush(plan);
         let (energy, outputs) = (self.energy, self.outputs);
         let last = samples.len().saturating_sub(HISTORY);
@@ -52,14 +50,13 @@ impl BandPower {
     pub fn push(&mut self, plan: &Plan, samples: &[i16]) {
         let mut samples = samples;
         while !samples.is_empty() {
-            samples = self.take(plan.kernels(), samples);
+            samples = self.take(&plan.kernels, samples);
             if self.filled >= BLOCK {
                 self.flush(plan);
             }
         }
     }
 
-    /// Takes as many samples as the block has room for, and gives the others back.
     fn take<'s>(&mut self, kernels: &Kernels, samples: &'s [i16]) -> &'s [i16] {
         let buffer = self.samples.0.get_mut(HISTORY + self.filled..);
         let buffer = buffer.unwrap_or_default();
@@ -73,8 +70,8 @@ impl BandPower {
     /// Sum of squares of all outputs in Q14 counts^2, and their number.
     fn flush(&mut self, plan: &Plan) {
         let filled = self.filled.min(BLOCK);
-        self.energy += (plan.kernels().band_energy)(
-            plan.taps(),
+        self.energy += (plan.kernels.band_energy)(
+            &BAND_PASS,
             self.samples.0.get(..HISTORY + filled).unwrap_or_default(),
         );
         self.outputs += filled as u32;
@@ -122,17 +119,15 @@ mod tests {
     fn full_scale_neither_overflows_nor_wraps() {
         // the worst input: the sign of every coefficient
         let plan = Plan::new();
-        let worst: Vec<i16> = plan
-            .taps()
-            .reversed()
+        let worst: Vec<i16> = BAND_PASS
+            .iter()
+            .rev()
             .map(|&h| if h < 0 { i16::MIN } else { i16::MAX })
             .collect();
         let mut power = BandPower::default();
         power.prime(&plan, &worst[..66]);
         power.push(&plan, &worst[66..]);
-        let y: f64 = plan
-            .taps()
-            .as_slice()
+        let y: f64 = BAND_PASS
             .iter()
             .map(|&h| f64::from(h).abs() / 32768.0 * if h < 0 { 4096.0 } else { 4095.0 })
             .sum();
@@ -152,7 +147,7 @@ mod tests {
             // straight from the definition, in f64
             let at = |n: isize| usize::try_from(n).ok().and_then(|n| samples.get(n)).map_or(0.0, |&x| f64::from(x));
             let oracle = (0..samples.len() as isize).map(|n| {
-                let y: f64 = plan.taps().as_slice().iter().enumerate().map(|(k, &h)| f64::from(h) / 32768.0 * at(n - k as isize)).sum();
+                let y: f64 = BAND_PASS.iter().enumerate().map(|(k, &h)| f64::from(h) / 32768.0 * at(n - k as isize)).sum();
                 y * y
             }).sum::<f64>() / samples.len() as f64;
 

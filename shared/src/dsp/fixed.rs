@@ -2,15 +2,15 @@
 //! agree to the bit by construction.
 
 /// Parts that an octave is divided into; straight lines in between.
-pub const PARTS: usize = 32;
+const PARTS: usize = 32;
 /// ln 2 in Q32.
-pub const LN_2: u32 = 2_977_044_472;
+pub(crate) const LN_2: u32 = 2_977_044_472;
 /// 1 / ln 2 in Q30.
-pub const LOG2_E: u32 = 1_549_082_005;
+pub(crate) const LOG2_E: u32 = 1_549_082_005;
 
 /// ln(1 + n/32) in Q32, and how much more the next one is, a multiple of 256.
 #[allow(clippy::indexing_slicing)] // while compiling
-pub const LN: [[u32; 2]; PARTS] = {
+const LN: [[u32; 2]; PARTS] = {
     let mut table = [[0; 2]; PARTS];
     let mut n = 0;
     while n < PARTS {
@@ -35,7 +35,7 @@ const fn ln_of_part(n: usize) -> u32 {
 
 /// 2^(-n/32) in Q30, and how much less the next one is.
 #[allow(clippy::indexing_slicing)] // while compiling
-pub const EXP2: [[u32; 2]; PARTS] = {
+const EXP2: [[u32; 2]; PARTS] = {
     let mut table = [[0; 2]; PARTS];
     let mut n = 0;
     while n < PARTS {
@@ -59,7 +59,7 @@ const fn exp2_of_part(n: usize) -> u32 {
 
 /// Natural logarithm of `x / 65536`, in Q16; 0 is taken as the smallest number. At most 1.5e-4 below the true value,
 /// never more than a step of Q16 above it.
-pub const fn ln_q16(x: u64) -> i32 {
+pub(crate) const fn ln_q16(x: u64) -> i32 {
     let x = if x == 0 { 1 } else { x };
     // a shift of 64 bits takes the chip several
     if x >> 32 == 0 {
@@ -83,7 +83,7 @@ const fn ln(mantissa: u32, octaves: i64) -> i32 {
 
 /// e^(-x) in Q30 of an `x` in Q16; relative error at most 7e-5, and 0 beyond 2^-30.
 #[inline(always)]
-pub const fn exp_neg_q30(x: u32) -> u32 {
+pub(crate) const fn exp_neg_q30(x: u32) -> u32 {
     let octaves = x as u64 * LOG2_E as u64; // Q46
     let whole = (octaves >> 46) as u32;
     if whole > 30 {
@@ -95,7 +95,7 @@ pub const fn exp_neg_q30(x: u32) -> u32 {
 
 /// 2^(-x) in Q30 of an `x` below 32 in Q18; relative error at most 7e-5.
 #[inline(always)]
-pub const fn exp2_neg_q30(x: u32) -> u32 {
+pub(crate) const fn exp2_neg_q30(x: u32) -> u32 {
     power(x >> 18, (x >> 13) as usize, x << 19)
 }
 

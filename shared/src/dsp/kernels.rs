@@ -101,7 +101,7 @@ fn band_energy(taps: &Taps, samples: &[i16]) -> u64 {
         .windows(TAPS)
         .map(|x| {
             // no sum overflows; asked each time, a build with such checks would take eight times as long
-            let y = x.iter().zip(taps.reversed()).fold(0i32, |sum, (&x, &h)| {
+            let y = x.iter().zip(taps.iter().rev()).fold(0i32, |sum, (&x, &h)| {
                 sum.wrapping_add(i32::from(x) * i32::from(h))
             });
             let y = i64::from((y + (1 << 7)) >> 8);

@@ -32,7 +32,7 @@ const WINDOW_BIN_1: f32 = -(FRAME as f32) / 2.0;
 
 /// Sums over frames: the power of every bin in counts^2, and the two complex bins that the mean of the slide reaches.
 #[derive(Clone, Debug)]
-pub struct FrameSum {
+struct FrameSum {
     /// Bins 1, 5, 9 and so on; those beyond the last are the mirror images of 255, 251 and so on.
     odd: [f32; FRAME / 4],
     /// Bins 2, 10, 18 and so on.
@@ -58,7 +58,6 @@ impl FrameSum {
         frames: 0,
     };
 
-    /// Adds the power of a frame that was folded once.
     fn add(&mut self, plan: &Plan, folded: &mut Folded) {
         let Kernels {
             fold,
@@ -66,7 +65,7 @@ impl FrameSum {
             transform_reals,
             add_power,
             ..
-        } = *plan.kernels();
+        } = plan.kernels;
         let angles = plan.angles();
         let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
             return;
@@ -111,7 +110,6 @@ impl FrameSum {
         self.frames += 1;
     }
 
-    /// By bins in their order.
     fn power(&self) -> [f32; BINS] {
         let mut power = [0.0; BINS];
         // one loop for all, because a handheld has little room
@@ -171,7 +169,7 @@ impl SpectrumSum {
             samples = self.fill(samples);
             if self.filled >= FRAME {
                 let mut buffer = MaybeUninit::uninit();
-                let fold = plan.kernels().fold_frame;
+                let fold = plan.kernels.fold_frame;
                 let folded = fold(plan.angles(), &self.frame, &mut buffer);
                 self.sum.add(plan, folded);
                 self.frame.copy_within(HOP.., 0);
@@ -180,7 +178,6 @@ impl SpectrumSum {
         }
     }
 
-    /// Takes as many samples as the frame has room for; the others.
     fn fill<'s>(&mut self, samples: &'s [i16]) -> &'s [i16] {
         let buffer = self.frame.get_mut(self.filled..).unwrap_or_default();
         let many = samples.len().min(buffer.len());

@@ -89,7 +89,6 @@ impl Default for Blocks {
 }
 
 impl Blocks {
-    /// The block so far, and an empty one in its place.
     fn take(&mut self, still: bool) -> Option<Block> {
         if self.block.pac.is_empty() && self.block.shear_mn.is_empty() {
             self.block.still = still;

@@ -17,8 +17,8 @@ pub struct Movement {
 
 /// The reasons why a force and a speed are not a movement of this rig.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum MovementError {
-    /// Contact force in mN outside [`Movement::FORCE_MN`].
     #[error(
         "contact force {} mN is outside {}..={} mN",
         .0,
@@ -26,7 +26,6 @@ pub enum MovementError {
         Movement::FORCE_MN.end()
     )]
     Force(u32),
-    /// Sliding speed in um/s outside [`Movement::SPEED_UM_S`].
     #[error(
         "sliding speed {} um/s is outside {}..={} um/s",
         .0,
@@ -36,7 +35,6 @@ pub enum MovementError {
     Speed(u32),
 }
 
-/// Force in mN and speed in um/s.
 impl TryFrom<(u16, u32)> for Movement {
     type Error = MovementError;
 
@@ -54,21 +52,19 @@ impl From<Movement> for (u16, u32) {
 impl Movement {
     /// Contact forces that a movement may have: a tenth of a newton is 9 counts of P_DC, and over 2 N the skin touches
     /// the core (fig. 3).
-    pub const FORCE_MN: core::ops::RangeInclusive<u16> = 100..=2000;
+    pub(crate) const FORCE_MN: core::ops::RangeInclusive<u16> = 100..=2000;
     /// Sliding speeds that a movement may have.
-    pub const SPEED_UM_S: core::ops::RangeInclusive<u32> = 5_000..=150_000;
+    pub(crate) const SPEED_UM_S: core::ops::RangeInclusive<u32> = 5_000..=150_000;
 
     /// Movement 1 of the study: 1.26 N, 1.00 cm/s, the most useful one for traction.
-    pub const FOR_TRACTION: Self = Self::on_grid(5, 1);
+    pub const FOR_TRACTION: Self = Self::on_grid(630_957, 100_000);
     /// Movement 2 of the study: 0.50 N, 2.51 cm/s, the most useful one for fineness.
-    pub const FOR_FINENESS: Self = Self::on_grid(3, 3);
+    pub const FOR_FINENESS: Self = Self::on_grid(251_189, 251_189);
     /// Movement 3 of the study: 0.20 N, 6.31 cm/s, the most useful one for roughness.
-    pub const FOR_ROUGHNESS: Self = Self::on_grid(1, 5);
+    pub const FOR_ROUGHNESS: Self = Self::on_grid(100_000, 630_957);
 
     /// A movement of `force_mn` millinewtons and `speed_um_s` micrometres per second.
-    ///
-    /// # Errors
-    /// The first value that is out of its range.
+    /// Errors: the first value that is out of its range.
     #[inline(never)]
     pub const fn new(force_mn: u16, speed_um_s: u32) -> Result<Self, MovementError> {
         if force_mn < *Self::FORCE_MN.start() || force_mn > *Self::FORCE_MN.end() {
@@ -84,9 +80,7 @@ impl Movement {
     }
 
     /// A movement from newtons and millimetres per second, rounded to whole mN and um/s.
-    ///
-    /// # Errors
-    /// The first value that is out of its range; not-a-number is out of every range.
+    /// Errors: the first value that is out of its range; not-a-number is out of every range.
     pub fn from_si(force_n: f32, speed_mm_s: f32) -> Result<Self, MovementError> {
         // `as` saturates, and turns not-a-number into 0: both are refused below
         let force_mn = libm::roundf(force_n * 1e3) as u32;
@@ -97,29 +91,21 @@ impl Movement {
         }
     }
 
-    /// Grid cell (i, k) of eq. 21 (force) and eq. 20 (speed), both 1..=6; other indices give the nearest cell.
-    const fn on_grid(i: usize, k: usize) -> Self {
-        // 10^((i-1)/5) in thousandths
-        const STEPS: [u32; 6] = [100_000, 158_489, 251_189, 398_107, 630_957, 1_000_000];
-        const fn step(i: usize) -> u32 {
-            match i {
-                0 | 1 => STEPS[0],
-                2 => STEPS[1],
-                3 => STEPS[2],
-                4 => STEPS[3],
-                5 => STEPS[4],
-                _ => STEPS[5],
-            }
-        }
+    /// 10^((i-1)/5) of eq. 20 and 21, times 100 000.
+    const STEPS: [u32; 6] = [100_000, 158_489, 251_189, 398_107, 630_957, 1_000_000];
+
+    /// Grid cell of a step of eq. 21 (force) and one of eq. 20 (speed).
+    const fn on_grid(force: u32, speed: u32) -> Self {
         Self {
-            force_mn: ((step(i) * 2 + 500) / 1000) as u16,
-            speed_um_s: (step(k) + 5) / 10,
+            force_mn: ((force * 2 + 500) / 1000) as u16,
+            speed_um_s: (speed + 5) / 10,
         }
     }
 
     /// The 36 movements of the pilot study, force by force: F_i of eq. 21 with v_k of eq. 20.
     pub fn grid() -> impl Iterator<Item = Self> {
-        (1..=6).flat_map(|i| (1..=6).map(move |k| Self::on_grid(i, k)))
+        let of_force = |force| Self::STEPS.map(|speed| Self::on_grid(force, speed));
+        Self::STEPS.into_iter().flat_map(of_force)
     }
 
     /// Contact force in mN.
@@ -161,7 +147,7 @@ impl Movement {
     }
 
     /// See [`Movement::is_high_wear`]: 2 mW times 10^(4.5/5).
-    pub const WEAR_LIMIT_MW: f32 = 15.887;
+    pub(crate) const WEAR_LIMIT_MW: f32 = 15.887;
 }
 
 impl fmt::Display for Movement {

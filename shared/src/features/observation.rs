@@ -48,7 +48,7 @@ impl FeatureSet {
     }
 
     /// Returns whether a table may have this set with `features` features in all.
-    pub const fn allows(self, features: usize) -> bool {
+    pub(crate) const fn allows(self, features: usize) -> bool {
         match self {
             Self::Properties => features == 3,
             _ => features > self.others() && features <= self.others() + FUSED_BANDS,
@@ -56,7 +56,7 @@ impl FeatureSet {
     }
 
     /// Returns whether a rig that measures `measured` can have these features. Every rig has P_AC and P_DC.
-    pub const fn measured_by(self, measured: PropertySet) -> bool {
+    pub(crate) const fn measured_by(self, measured: PropertySet) -> bool {
         match self {
             Self::Force => measured.contains(Property::Traction),
             Self::Pressure | Self::Bands => true,

@@ -45,30 +45,20 @@ pub fn roughness(power: f32, background: f32) -> (f32, bool) {
 
 /// The reasons why a slide has no properties. A rig repeats such a slide.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum SlideError {
-    /// The steady window was never set.
     #[error("the slide never reached its steady part")]
     NotStarted,
-    /// Samples arrived for only part of the steady window.
     #[error("only {got} of {wanted} samples of the steady part arrived")]
-    Unfinished {
-        /// Samples of P_AC inside the window.
-        got: u32,
-        /// Length of the window.
-        wanted: u32,
-    },
-    /// The steady window is shorter than one frame of the spectrum.
+    Unfinished { got: u32, wanted: u32 },
     #[error(
         "the steady part is too short, {0} of the {FRAME} samples that the spectrum needs: slide longer or slower"
     )]
     TooShort(u32),
-    /// The still finger was not measured before the slide, and its power is not known otherwise.
     #[error("the background of the still finger was not measured")]
     NoBackground,
-    /// P_AC does not move at all: no sensor, or one that hangs.
     #[error("P_AC never changed: is the sensor connected?")]
     Silent,
-    /// So many samples between the background and the end of the slide were lost.
     #[error("samples were lost: {0}")]
     Gap(u32),
 }
@@ -78,7 +68,6 @@ pub enum SlideError {
 pub struct Slide<'p> {
     plan: &'p Plan,
     movement: Movement,
-    /// Number of the next block.
     next: u16,
     still: BandPower,
     still_samples: usize,
@@ -128,7 +117,7 @@ impl<'p> Slide<'p> {
     }
 
     /// Takes over all that another slide of the same movement has measured, by a plan of its own.
-    pub fn adopt(&mut self, other: &Slide<'_>) {
+    pub(crate) fn adopt(&mut self, other: &Slide<'_>) {
         self.next = other.next;
         self.still = other.still.clone();
         self.still_samples = other.still_samples;
@@ -231,11 +220,8 @@ impl<'p> Slide<'p> {
     }
 
     /// The properties, when the steady part is over.
-    ///
-    /// # Errors
-    /// See [`SlideError`].
     pub fn finish(mut self) -> Result<Measurement, SlideError> {
-        self.measure(self.steady.end.saturating_sub(self.steady.start))
+        self.look(self.steady.end.saturating_sub(self.steady.start))
     }
 
     /// Samples of P_AC at constant speed that have come.
@@ -245,15 +231,7 @@ impl<'p> Slide<'p> {
 
     /// The properties of what has come so far, as of a slide whose steady part was not longer; of it so many samples of
     /// P_AC must be there. The slide goes on as if nobody had looked.
-    ///
-    /// # Errors
-    /// See [`SlideError`].
-    pub fn look(&mut self, samples: u32) -> Result<Measurement, SlideError> {
-        self.measure(samples)
-    }
-
-    #[inline(always)]
-    fn measure(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
+    pub fn look(&mut self, wanted: u32) -> Result<Measurement, SlideError> {
         let got = self.spectrum.samples();
         if self.lost > 0 {
             return Err(SlideError::Gap(self.lost));

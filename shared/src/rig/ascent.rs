@@ -28,7 +28,6 @@ pub(super) fn is_far(finger: &FingerModel, counts: Option<f32>, air: f32) -> boo
     counts.is_some_and(|counts| libm::fabsf(counts - air) > finger.counts(AIR_MN))
 }
 
-/// P_DC on the way to the limit switch.
 #[derive(Clone, Debug)]
 pub(super) struct Ascent {
     finger: &'static FingerModel,
@@ -45,7 +44,6 @@ pub(super) struct Ascent {
 }
 
 impl Ascent {
-    /// A state for such a finger, without any knowledge of its P_DC.
     pub(super) fn new(finger: &'static FingerModel) -> Self {
         Self {
             finger,
@@ -57,7 +55,6 @@ impl Ascent {
         }
     }
 
-    /// Forgets P_DC: the finger or its calibration is another.
     pub(super) fn forget(&mut self) {
         (self.lowest, self.pressed) = (None, false);
     }
@@ -169,12 +166,10 @@ impl Ascent {
         }
     }
 
-    /// Takes P_DC without contact, counts.
     pub(super) fn zero(&mut self, counts: f32) {
         self.lowest = Some(counts);
     }
 
-    /// The least P_DC so far, counts.
     pub(super) fn lowest(&self) -> Option<f32> {
         self.lowest
     }
@@ -183,13 +178,12 @@ impl Ascent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::PressureSensor as _;
-    use crate::sensor::biotac::BioTac;
+    use crate::sensor::biotac;
     use crate::sensor::pressure::Counts;
 
     #[test]
     fn what_rose_once_must_fall_before_the_next_try() {
-        let mut ascent = Ascent::new(&BioTac::MODEL);
+        let mut ascent = Ascent::new(&biotac::PARTS.model);
         assert!(ascent.begin(None, None));
         for mean in [None, Some(2700.0), Some(2650.0), Some(2658.0)] {
             assert_eq!(ascent.rises(mean, RISEN_MN), None);
@@ -216,7 +210,7 @@ mod tests {
 
     #[test]
     fn noise_that_seemed_a_press_is_forgotten_where_p_dc_is_as_it_was_in_the_air() {
-        let mut ascent = Ascent::new(&BioTac::MODEL);
+        let mut ascent = Ascent::new(&biotac::PARTS.model);
         assert!(ascent.begin(None, Some(2600.0)));
         // words of noise make it seem lower than it is
         assert_eq!(ascent.rises(Some(2570.0), AIR_MN), None);
@@ -236,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_press_keeps_the_last_zero() {
-        let mut ascent = Ascent::new(&BioTac::MODEL);
+        let mut ascent = Ascent::new(&biotac::PARTS.model);
         ascent.zero(2600.0);
         ascent.pressed = true;
         assert!(!ascent.begin(None, None));
@@ -256,7 +250,7 @@ mod tests {
             (Fault::Unsteady, None),
         ] {
             let mut meter = ForceMeter::new(2600.0);
-            let mut ascent = Ascent::new(&BioTac::MODEL);
+            let mut ascent = Ascent::new(&biotac::PARTS.model);
             let mut found = None;
             for ms in 1..100 {
                 for _ in 0..2 {
@@ -271,7 +265,7 @@ mod tests {
     #[test]
     fn a_finger_that_waits_may_warm_up_but_not_be_pressed() {
         let mut meter = ForceMeter::new(2600.0);
-        let mut ascent = Ascent::new(&BioTac::MODEL);
+        let mut ascent = Ascent::new(&biotac::PARTS.model);
         let mut wait = |ascent: &mut Ascent, ms: u32, counts_per_ms: f32, from: f32| {
             let mut seen = None;
             for ms in 0..ms {

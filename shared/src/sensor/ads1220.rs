@@ -9,7 +9,7 @@ use embedded_hal::spi::MODE_1;
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
 /// The port: chip select, mode and clock.
-pub const PORT: Port = Port {
+pub(super) const PORT: Port = Port {
     name: "ADS1220 of the load cell",
     // DS 8.5.1: mode 1 only
     mode: MODE_1,
@@ -37,10 +37,8 @@ const CONFIG2: u8 = 0xC0;
 /// CONFIG3: DRDY has its own pin alone (DS 8.6).
 const CONFIG3: u8 = 0x00;
 
-/// Conversions in a second; the clock is within 2 % (DS 6.5).
-pub const RATE_HZ: u32 = 1000;
 /// LSBs of the whole range: +-1/128 of the reference is +-2^23 (DS 8.5.2).
-pub const LSB_PER_UNIT: f32 = 128.0 * 8_388_608.0;
+pub(super) const LSB_PER_UNIT: f32 = 128.0 * 8_388_608.0;
 
 const fn access(out: &'static [u8], answer: u8) -> Transaction {
     Transaction {
@@ -52,33 +50,23 @@ const fn access(out: &'static [u8], answer: u8) -> Transaction {
     }
 }
 
-const fn step(
-    out: &'static [u8],
-    answer: u8,
-    expect: &'static [(u8, u8)],
-    wait_us: u32,
-) -> StartStep {
-    StartStep {
-        transaction: access(out, answer),
-        expect,
-        wait_us,
-    }
-}
-
 /// The steps of [`START`] that show whether it is there.
-pub const CHECK: [StartStep; 3] = {
+pub(super) const CHECK: [StartStep; 3] = {
     let [reset, write, read, _] = START;
     [reset, write, read]
 };
 
 /// From power-up to the first slot.
-pub const START: [StartStep; 4] = [
+pub(super) const START: [StartStep; 4] = [
     // DS 8.5.3.1: 50 us and 32 clocks, here twice as long
-    step(&[RESET], 0, &[], 120),
-    step(&[WREG_ALL, CONFIG0, CONFIG1, CONFIG2, CONFIG3], 0, &[], 0),
-    step(
-        &[RREG_ALL, 0, 0, 0, 0],
-        4,
+    StartStep::new(access(&[RESET], 0), &[], 120),
+    StartStep::new(
+        access(&[WREG_ALL, CONFIG0, CONFIG1, CONFIG2, CONFIG3], 0),
+        &[],
+        0,
+    ),
+    StartStep::new(
+        access(&[RREG_ALL, 0, 0, 0, 0], 4),
         &[
             (0xFF, CONFIG0),
             (0xFF, CONFIG1),
@@ -88,20 +76,20 @@ pub const START: [StartStep; 4] = [
         0,
     ),
     // DS 8.4.2.2: the first conversion begins 210 clocks later, and takes a millisecond
-    step(&[START_SYNC], 0, &[], 2500),
+    StartStep::new(access(&[START_SYNC], 0), &[], 2500),
 ];
 
 /// Reads the last whole conversion, whenever that was (DS 8.5.4: RDATA needs no DRDY).
-pub const READ: Transaction = access(&[RDATA, 0, 0, 0], 3);
+pub(super) const READ: Transaction = access(&[RDATA, 0, 0, 0], 3);
 
 /// The conversion in an answer, LSB.
-pub const fn code(answer: [u8; 3]) -> i32 {
+pub(super) const fn code(answer: [u8; 3]) -> i32 {
     let [upper, middle, lower] = answer;
     // the sign comes down with the shift
     i32::from_be_bytes([upper, middle, lower, 0]) >> 8
 }
 
 /// Returns whether a conversion is at an end of the range: an input that nothing drives.
-pub const fn is_clipped(code: i32) -> bool {
+pub(super) const fn is_clipped(code: i32) -> bool {
     code == 0x7F_FFFF || code == -0x80_0000
 }

@@ -4,7 +4,7 @@ use core::fmt;
 use core::str::FromStr;
 
 use super::finger::{FingerName, UnknownFinger};
-use serde::de::{Error, Unexpected, Visitor};
+use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A kind of finger: on the line and in tables its number, in text its name.
@@ -58,25 +58,11 @@ impl Serialize for FingerCode {
 impl<'d> Deserialize<'d> for FingerCode {
     fn deserialize<D: Deserializer<'d>>(from: D) -> Result<Self, D::Error> {
         if from.is_human_readable() {
-            from.deserialize_str(ByName)
+            let name = heapless::String::<16>::deserialize(from)?;
+            name.parse().map_err(D::Error::custom)
         } else {
             u8::deserialize(from).map(Self)
         }
-    }
-}
-
-struct ByName;
-
-impl Visitor<'_> for ByName {
-    type Value = FingerCode;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the name of a finger")
-    }
-
-    fn visit_str<E: Error>(self, name: &str) -> Result<FingerCode, E> {
-        let unknown = |_| E::invalid_value(Unexpected::Str(name), &self);
-        name.parse().map_err(unknown)
     }
 }
 

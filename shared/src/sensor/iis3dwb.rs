@@ -13,7 +13,7 @@ use embedded_hal::spi::MODE_3;
 use crate::sensor::slot::{Port, StartStep, Transaction};
 
 /// The port: chip select, mode and clock.
-pub const PORT: Port = Port {
+pub(super) const PORT: Port = Port {
     name: "IIS3DWB accelerometer",
     // DS: clock idle high, sampled on the second edge
     mode: MODE_3,
@@ -22,7 +22,7 @@ pub const PORT: Port = Port {
 };
 
 /// From power to the first transfer, ms (EX: BOOT_TIME; DS: boot).
-pub const POWER_UP_MS: u32 = 10;
+pub(super) const POWER_UP_MS: u32 = 10;
 
 const READ: u8 = 0x80;
 /// Addresses (REG).
@@ -49,7 +49,7 @@ const Z_ALONE: u8 = 0x03;
 const IN_ALL: u8 = 0x01;
 
 /// The value of an LSB at +-2 g, g (REG: iis3dwb_from_fs2g_to_mg).
-pub const G_PER_LSB: f32 = 0.061e-3;
+pub(super) const G_PER_LSB: f32 = 0.061e-3;
 
 /// A transaction with the accelerometer, which is part 0 of its finger.
 const fn access(out: &'static [u8], answer: u8) -> Transaction {
@@ -58,29 +58,21 @@ const fn access(out: &'static [u8], answer: u8) -> Transaction {
 }
 
 const fn write(out: &'static [u8], wait_us: u32) -> StartStep {
-    StartStep {
-        transaction: access(out, 0),
-        expect: &[],
-        wait_us,
-    }
+    StartStep::new(access(out, 0), &[], wait_us)
 }
 
 const fn read(out: &'static [u8], expect: &'static [(u8, u8)]) -> StartStep {
-    StartStep {
-        transaction: access(out, 1),
-        expect,
-        wait_us: 0,
-    }
+    StartStep::new(access(out, 1), expect, 0)
 }
 
 /// The step of [`START`] that shows whether it is there.
-pub const CHECK: [StartStep; 1] = {
+pub(super) const CHECK: [StartStep; 1] = {
     let [identity, ..] = START;
     [identity]
 };
 
 /// From power-up to the first slot.
-pub const START: [StartStep; 13] = [
+pub(super) const START: [StartStep; 13] = [
     read(&[READ | WHO_AM_I, 0], &[(0xFF, IDENTITY)]),
     // EX waits until the bit falls; AN: 50 us, here 20 times as long
     write(&[CTRL3_C, RESET], 1000),
@@ -99,12 +91,12 @@ pub const START: [StartStep; 13] = [
 ];
 
 /// Reads Z: two bytes, the lower first, and the reserved one behind them, so that the number of bytes is even.
-pub const READ_Z: Transaction = access(&[READ | OUTZ_L_A, 0, 0, 0], 3);
+pub(super) const READ_Z: Transaction = access(&[READ | OUTZ_L_A, 0, 0, 0], 3);
 
 /// Asks whether it is on: after a brown-out it has its identity and is off.
-pub const READ_ON: Transaction = access(&[READ | CTRL1_XL, 0], 1);
+pub(super) const READ_ON: Transaction = access(&[READ | CTRL1_XL, 0], 1);
 
 /// Returns whether the answer to [`READ_ON`] says so, with the range and the filter as they were set.
-pub const fn is_on(ctrl1_xl: u8) -> bool {
+pub(super) const fn is_on(ctrl1_xl: u8) -> bool {
     ctrl1_xl & 0xEE == ON & 0xEE
 }

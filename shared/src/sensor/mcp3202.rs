@@ -6,7 +6,7 @@ use crate::sensor::pressure::Counts;
 use crate::sensor::slot::{Port, Transaction};
 
 /// The port: chip select, mode and clock.
-pub const PORT: Port = Port {
+pub(super) const PORT: Port = Port {
     name: "MCP3202",
     // also 3 (DS21034, features)
     mode: MODE_0,
@@ -19,27 +19,19 @@ pub const PORT: Port = Port {
 ///
 /// Start bit at the end of byte 0, then single-ended, the channel, and most significant bit first (DS21034, fig. 6-1
 /// and table 5-1). Chip select has to go high between conversions (DS21034, 3.2).
-pub const CONVERSIONS: [Transaction; 2] = [
+pub(super) const CONVERSIONS: [Transaction; 2] = [
     Transaction::first_port(&[0x01, 0b1010_0000, 0x00], 2, 1),
     Transaction::first_port(&[0x01, 0b1110_0000, 0x00], 2, 1),
 ];
 
-/// The reading in an answer. Three bits are not driven; then a null bit and 12 bits, the most significant first.
-///
-/// # Errors
-/// The null bit is 1, or the answer did not come.
-pub fn decode(answer: &[u8]) -> Result<Counts, NullBit> {
+/// The reading in an answer; `None` if the converter does not drive the line, or the answer did not come. Three bits
+/// are not driven; then a null bit and 12 bits, the most significant first. A line that is pulled low reads as 0
+/// counts.
+pub(super) fn decode(answer: &[u8]) -> Option<Counts> {
     match *answer {
         [upper, lower] if upper & 0b1_0000 == 0 => {
-            Ok(Counts::from_low_bits(u16::from_be_bytes([upper, lower])))
+            Some(Counts::from_low_bits(u16::from_be_bytes([upper, lower])))
         }
-        _ => Err(NullBit),
+        _ => None,
     }
 }
-
-/// The bit before the sample was 1: the converter does not drive the line.
-///
-/// A line that is pulled low reads as 0 counts instead; [`Counts::is_clipped`] tells.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
-#[error("no converter answers (null bit is 1): check power, cable, chip select and SPI mode 0")]
-pub struct NullBit;

@@ -5,11 +5,10 @@
 //! and tilt away, and most of a hand's tremor. The cell is read in every fourth slot, 1100 times a second, and held
 //! between.
 
-use crate::sensor::driver::{BadWord, GRAVITY_PARTS, PressureSensor};
-use crate::sensor::finger::{AtRest, FingerModel, FingerName};
-use crate::sensor::pressure::{Calibration, Channel, Counts, Pressure, RATE_HZ};
-use crate::sensor::slot::{Port, StartStep, Transaction};
-use crate::sensor::{ads1220, iis3dwb};
+use super::finger::{AtRest, FingerError, FingerModel, FingerName, FingerParts, GRAVITY_PARTS};
+use super::pressure::{Calibration, Channel, Counts, Pressure, RATE_HZ};
+use super::slot::StartStep;
+use super::{ads1220, iis3dwb};
 
 /// A count of P_AC is so many LSBs of acceleration: 16, 0.98 mg. Its noise of 60 ug/sqrt(Hz) is then 2 counts
 /// (DS12569).
@@ -29,8 +28,6 @@ const MN_PER_COUNT: f32 = 9.806_65e6 * (1 << PDC_SHIFT) as f32 / ads1220::LSB_PE
 const SIDE: [i32; 4] = [-306, 1048, -2766, 10_197];
 const MIDDLE: i32 = 16_422;
 const TAPS: usize = 15;
-/// The filter's delay, slots.
-pub const DELAY_SLOTS: u32 = TAPS as u32 / 2;
 
 /// Share of the high-pass's slow part that a sample makes, in 1/32768: 10 Hz at 2200 samples a second.
 const SLOW_SHARE: i32 = (core::f32::consts::TAU * 10.0 / RATE_HZ as f32 * 32_768.0) as i32;
@@ -40,7 +37,42 @@ const SLOW_SHARE: i32 = (core::f32::consts::TAU * 10.0 / RATE_HZ as f32 * 32_768
 /// a thousand: by chance there are three equal reads every few seconds, and five once in a month.
 const MOST_SAME: u8 = 5;
 
-/// The finger as a [`PressureSensor`], with its state.
+/// The finger on its bus.
+pub const PARTS: FingerParts = FingerParts {
+    model: FingerModel {
+        name: FingerName::Mems,
+        calibration: Calibration {
+            // in the place of pascals: mg
+            pac_pa_per_count: PAC_LSB as f32 * iis3dwb::G_PER_LSB * 1e3,
+            pac_rest: PAC_REST as f32,
+            // of the force on a square centimetre
+            pdc_pa_per_count: MN_PER_COUNT * 10.0,
+            pdc_no_contact: PDC_BALANCE as f32,
+            force_mn_per_count: MN_PER_COUNT,
+            linear_mn: Calibration::PAPER.linear_mn,
+        },
+        pac_shows_force: false,
+        at_rest: AtRest {
+            pac_noise_counts: (0.8, 8.0),
+            // a cell's zero is off by a tenth of its range or less, 105 counts, and the tip on it weighs 10 g at most,
+            // 10 counts
+            pdc_counts: (850.0, 1150.0),
+        },
+    },
+    ports: &[iis3dwb::PORT, ads1220::PORT],
+    power_up_ms: iis3dwb::POWER_UP_MS,
+    start: &START,
+    slots: &[
+        &[iis3dwb::READ_Z],
+        &[iis3dwb::READ_Z, ads1220::READ],
+        &[iis3dwb::READ_Z],
+        &[iis3dwb::READ_Z, iis3dwb::READ_ON],
+    ],
+    deaf_ms: 0,
+    feels_gravity: true,
+};
+
+/// The decoder's memory.
 #[derive(Clone, Debug)]
 pub struct Mems {
     /// Z in the last slots, the latest last, LSB; how many of them came.
@@ -68,15 +100,43 @@ impl Mems {
         }
     }
 
-    /// The filtered acceleration of now and [`DELAY_SLOTS`] before, without what is slower than 10 Hz, LSB.
+    pub(super) fn sample(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, FingerError> {
+        let [low, high, _, rest @ ..] = answer else {
+            return Err(FingerError::Silent);
+        };
+        self.take_z(i16::from_le_bytes([*low, *high]));
+        // -1 from both at once is a line that nobody drives
+        if matches!(answer, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]) {
+            self.cell = None;
+            return Err(FingerError::Silent);
+        }
+        match *rest {
+            [upper, middle, lower] => self.take_cell(ads1220::code([upper, middle, lower])),
+            [ctrl1_xl] => self.on = iis3dwb::is_on(ctrl1_xl),
+            _ => {}
+        }
+        let channel = Channel::of_slot(n);
+        let counts = match channel {
+            Channel::Pac => self.pac()?,
+            Channel::Pdc => self.pdc()?,
+        };
+        Ok(Pressure { channel, counts })
+    }
+
+    /// Gravity along the finger: what the high-pass takes away.
+    pub(super) fn gravity(&self) -> Option<i32> {
+        const { assert!(PAC_LSB as f32 == GRAVITY_PARTS) };
+        Some((self.slow? >> 15) as i32)
+    }
+
+    /// The filtered acceleration of 7 slots ago, without what is slower than 10 Hz, LSB.
     fn acceleration(&mut self) -> i32 {
-        let half = DELAY_SLOTS as usize;
         let ends = self.z.iter().zip(self.z.iter().rev()).step_by(2);
         let sides: i32 = ends
             .zip(SIDE)
             .map(|((a, b), share)| (i32::from(*a) + i32::from(*b)) * share)
             .sum();
-        let middle = self.z.get(half).map_or(0, |z| i32::from(*z));
+        let middle = self.z.get(TAPS / 2).map_or(0, |z| i32::from(*z));
         let now = i64::from(sides) + i64::from(middle) * i64::from(MIDDLE);
         let before = self.slow.unwrap_or(now);
         let slow = before + (now - before) * i64::from(SLOW_SHARE) / 32_768;
@@ -101,14 +161,14 @@ impl Mems {
         self.cell = Some(code);
     }
 
-    fn pac(&mut self) -> Result<Counts, MemsError> {
+    fn pac(&mut self) -> Result<Counts, FingerError> {
         if usize::from(self.came) < TAPS {
-            return Err(MemsError::Begins);
+            return Err(FingerError::Begins);
         }
         let acceleration = self.acceleration();
         let [.., before, last] = self.z;
         if !self.on {
-            return Err(MemsError::Off);
+            return Err(FingerError::Off);
         }
         // at an end of the accelerometer's range nobody knows how far it was beyond
         for z in [before, last] {
@@ -123,22 +183,16 @@ impl Mems {
         ))
     }
 
-    fn pdc(&self) -> Result<Counts, MemsError> {
-        let code = self.cell.ok_or(MemsError::Begins)?;
+    fn pdc(&self) -> Result<Counts, FingerError> {
+        let code = self.cell.ok_or(FingerError::Begins)?;
         if ads1220::is_clipped(code) {
-            return Err(MemsError::Cell);
+            return Err(FingerError::Cell);
         }
         if self.same >= MOST_SAME {
-            return Err(MemsError::Stale);
+            return Err(FingerError::Stale);
         }
         let half = 1 << (PDC_SHIFT - 1);
         Ok(clamp(PDC_BALANCE + ((code + half) >> PDC_SHIFT)))
-    }
-}
-
-impl Default for Mems {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -147,78 +201,6 @@ fn clamp(counts: i32) -> Counts {
     Counts::from_low_bits(within as u16)
 }
 
-impl PressureSensor for Mems {
-    type Error = MemsError;
-    const MODEL: FingerModel = FingerModel {
-        name: FingerName::Mems,
-        calibration: Calibration {
-            // in the place of pascals: mg
-            pac_pa_per_count: PAC_LSB as f32 * iis3dwb::G_PER_LSB * 1e3,
-            pac_rest: PAC_REST as f32,
-            // of the force on a square centimetre
-            pdc_pa_per_count: MN_PER_COUNT * 10.0,
-            pdc_no_contact: PDC_BALANCE as f32,
-            force_mn_per_count: MN_PER_COUNT,
-            linear_mn: Calibration::PAPER.linear_mn,
-        },
-        pac_shows_force: false,
-        at_rest: AtRest {
-            pac_noise_counts: (0.8, 8.0),
-            // a cell's zero is off by a tenth of its range or less, 105 counts, and the tip on it weighs 10 g at most,
-            // 10 counts
-            pdc_counts: (850.0, 1150.0),
-        },
-    };
-    const PORTS: &'static [Port] = &[iis3dwb::PORT, ads1220::PORT];
-    const POWER_UP_MS: u32 = iis3dwb::POWER_UP_MS;
-    const START: &'static [StartStep] = &START;
-    const FEELS_GRAVITY: bool = true;
-    const SLOTS: &'static [&'static [Transaction]] = &[
-        &[iis3dwb::READ_Z],
-        &[iis3dwb::READ_Z, ads1220::READ],
-        &[iis3dwb::READ_Z],
-        &[iis3dwb::READ_Z, iis3dwb::READ_ON],
-    ];
-
-    fn decode(&mut self, n: u32, answer: &[u8]) -> Result<Pressure, MemsError> {
-        let [low, high, _, rest @ ..] = answer else {
-            return Err(MemsError::Silent);
-        };
-        self.take_z(i16::from_le_bytes([*low, *high]));
-        // -1 from both at once is a line that nobody drives
-        if matches!(answer, [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]) {
-            self.cell = None;
-            return Err(MemsError::Silent);
-        }
-        match *rest {
-            [upper, middle, lower] => self.take_cell(ads1220::code([upper, middle, lower])),
-            [ctrl1_xl] => self.on = iis3dwb::is_on(ctrl1_xl),
-            _ => {}
-        }
-        let channel = Channel::of_slot(n);
-        let counts = match channel {
-            Channel::Pac => self.pac()?,
-            Channel::Pdc => self.pdc()?,
-        };
-        Ok(Pressure { channel, counts })
-    }
-
-    fn gravity(&self) -> Option<i32> {
-        const { assert!(PAC_LSB as f32 == GRAVITY_PARTS) };
-        // what the high-pass takes away
-        Some((self.slow? >> 15) as i32)
-    }
-
-    fn kind(why: &MemsError) -> Option<BadWord> {
-        match why {
-            MemsError::Begins => None,
-            MemsError::Silent => Some(BadWord::Silent),
-            MemsError::Off | MemsError::Stale | MemsError::Cell => Some(BadWord::Refused),
-        }
-    }
-}
-
-/// Both parts, one after the other.
 #[allow(clippy::indexing_slicing)] // while compiling
 const START: [StartStep; iis3dwb::START.len() + ads1220::START.len()] = {
     let mut both = [iis3dwb::START[0]; iis3dwb::START.len() + ads1220::START.len()];
@@ -233,30 +215,6 @@ const START: [StartStep; iis3dwb::START.len() + ads1220::START.len()] = {
     }
     both
 };
-
-/// The reasons why an answer is not a sample.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
-pub enum MemsError {
-    /// Fewer bytes came than were asked for, or nothing drives the line.
-    #[error("no part of the finger answers: check its plug, its power and the data line")]
-    Silent,
-    /// The filter is not full yet, or the cell was not read yet.
-    #[error("the finger has just begun")]
-    Begins,
-    /// The accelerometer says that it is off: it has lost its power meanwhile.
-    #[error(
-        "the IIS3DWB accelerometer is off: check its power and its wires, then switch off and on"
-    )]
-    Off,
-    /// The cell's converter no longer converts: it has lost its power meanwhile, or nobody answers.
-    #[error(
-        "the ADS1220 of the load cell says the same again and again: check its power, its wires and SPI mode 1"
-    )]
-    Stale,
-    /// The cell's input is at an end of its range.
-    #[error("the load cell is at an end of the ADS1220's range: check its four wires")]
-    Cell,
-}
 
 #[cfg(test)]
 mod tests;

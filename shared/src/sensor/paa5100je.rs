@@ -16,7 +16,6 @@ pub const CLOCK_HZ: u32 = 2_000_000;
 /// table are made with the same probe, that cancels.
 pub const COUNTS_PER_MM: f32 = 228.0 / 25.0;
 
-/// Bit of an address that is written.
 const WRITE: u8 = 0x80;
 const IDENTITY: u8 = 0x00;
 const MOTION: u8 = 0x02;
@@ -100,60 +99,34 @@ const LIST: [Writes; 3] = [
     &[[0x73, 0x00]],
 ];
 
-/// The motion since the last reading.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Reading {
-    /// True if anything has moved.
-    pub any: bool,
-    /// Counts along both axes.
-    pub counts: [i16; 2],
-    /// Features of the surface that it sees.
-    pub quality: u8,
-    /// Upper five bits of the exposure.
-    pub shutter: u8,
-}
-
-impl Reading {
-    /// From the twelve bytes of a burst.
-    pub const fn decode(burst: [u8; 12]) -> Self {
-        let [motion, _, x0, x1, y0, y1, quality, _, _, _, shutter, _] = burst;
-        Self {
-            any: motion & 0x80 != 0,
-            counts: [i16::from_le_bytes([x0, x1]), i16::from_le_bytes([y0, y1])],
-            quality,
-            shutter: shutter & 0x1F,
-        }
-    }
-
-    /// The distance moved, counts along both axes; `None` where it does not see the surface.
-    pub const fn moved(&self) -> Option<[i16; 2]> {
-        if self.quality < LEAST_QUALITY && self.shutter == LONGEST_SHUTTER {
-            None
-        } else if self.any {
-            Some(self.counts)
-        } else {
-            Some([0, 0])
-        }
+/// The distance moved since the last reading, counts along both axes, in the twelve bytes of a burst; `None` where it
+/// does not see the surface.
+const fn moved(burst: [u8; 12]) -> Option<[i16; 2]> {
+    // quality: features of the surface that it sees; shutter: upper five bits of the exposure
+    let [motion, _, x0, x1, y0, y1, quality, _, _, _, shutter, _] = burst;
+    if quality < LEAST_QUALITY && shutter & 0x1F == LONGEST_SHUTTER {
+        None
+    } else if motion & 0x80 != 0 {
+        Some([i16::from_le_bytes([x0, x1]), i16::from_le_bytes([y0, y1])])
+    } else {
+        Some([0, 0])
     }
 }
 
 /// The reasons why it cannot be used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum MotionFault {
-    /// The bus or the chip select failed.
     #[error("the motion sensor's bus failed")]
     Bus,
-    /// Something else answers, or nothing.
     #[error(
         "no PAA5100JE answers: it says 0x{:02x} and 0x{:02x}; check power, cable, chip select and SPI mode 3", .0[0], .0[1]
     )]
     Identity([u8; 2]),
-    /// It is there, and what was written to it is not: its power was gone meanwhile.
     #[error("the motion sensor has forgotten its settings: check its power")]
     Forgot,
 }
 
-/// The state of the driver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
     /// To be reset.
@@ -173,10 +146,8 @@ pub struct Paa5100je<SPI> {
     state: State,
     /// Nothing is done before this time, ms.
     until_ms: Option<u32>,
-    /// The time of the last motion.
     moved_ms: u32,
     fault: Option<MotionFault>,
-    /// It has said once who it is.
     found: bool,
 }
 
@@ -268,10 +239,10 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
                 }
             },
             State::Ready => {
-                let reading = self.read_motion()?;
+                let burst = self.read_motion()?;
                 // a line that floats gives readings, too
                 self.check()?;
-                return Ok(reading.moved());
+                return Ok(moved(burst));
             }
         };
         self.state = next;
@@ -279,7 +250,6 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
         Ok(None)
     }
 
-    /// Checks that the part is there.
     fn identify(&mut self) -> Result<(), MotionFault> {
         let is = [self.read(IDENTITY)?, self.read(INVERSE_IDENTITY)?];
         if is == IS {
@@ -290,7 +260,6 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
         }
     }
 
-    /// Checks that the part is there and set up.
     fn check(&mut self) -> Result<(), MotionFault> {
         self.identify()?;
         if self.read(ORIENTATION)? == TURNED {
@@ -317,10 +286,10 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
         Ok(())
     }
 
-    fn read_motion(&mut self) -> Result<Reading, MotionFault> {
+    fn read_motion(&mut self) -> Result<[u8; 12], MotionFault> {
         let mut burst = [0; 12];
         self.transfer(BURST, &mut burst)?;
-        Ok(Reading::decode(burst))
+        Ok(burst)
     }
 
     fn write_all(&mut self, writes: &[[u8; 2]]) -> Result<(), MotionFault> {

@@ -54,14 +54,8 @@ impl Counts {
     }
 
     /// The lower 12 bits of `word`; the upper 4 are ignored.
-    pub const fn from_low_bits(word: u16) -> Self {
+    pub(crate) const fn from_low_bits(word: u16) -> Self {
         Self(word & Self::MAX.0)
-    }
-
-    /// The nearest reading; what is out of range gives the end of the range, not-a-number gives 0.
-    pub fn saturating(value: f32) -> Self {
-        // `as` saturates at the ends of u16
-        Self((libm::roundf(value) as u16).min(Self::MAX.0))
     }
 
     /// 0..=4095.
@@ -70,7 +64,7 @@ impl Counts {
     }
 
     /// Returns whether the reading sits at an end of the range: the real voltage may lie beyond it.
-    pub const fn is_clipped(self) -> bool {
+    pub(crate) const fn is_clipped(self) -> bool {
         self.0 == Self::MIN.0 || self.0 == Self::MAX.0
     }
 }
@@ -82,16 +76,6 @@ pub struct Pressure {
     pub channel: Channel,
     /// The reading.
     pub counts: Counts,
-}
-
-/// A contact force read from P_DC.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Force {
-    /// mN by the linear relation; below 0 when P_DC has drifted under its no-contact value.
-    pub mn: f32,
-    /// The force lies beyond the range where the relation is a line: the skin touches the core, `mn` is only a lower
-    /// bound of how hard the finger presses, and the finger must be lifted.
-    pub beyond_linear: bool,
 }
 
 /// The constants of one fingertip. All of them differ from device to device; store those measured on yours.
@@ -136,11 +120,9 @@ impl Calibration {
     };
 
     /// Checks a record that comes from storage or from the host before a motor is moved by it.
-    ///
-    /// # Errors
-    /// The first impossible value: a scale that is not above 0, a rest value outside the converter's range, or a
-    /// no-contact value that leaves less than the linear range below full scale, so that the finger would press on and
-    /// P_DC would not show it.
+    /// Errors: the first impossible value: a scale that is not above 0, a rest value outside the converter's range, or
+    /// a no-contact value that leaves less than the linear range below full scale, so that the finger would press on
+    /// and P_DC would not show it.
     #[inline(never)]
     pub fn check(&self) -> Result<(), CalibrationError> {
         let scales = [
@@ -164,82 +146,26 @@ impl Calibration {
         Ok(())
     }
 
-    /// Pressure of `counts` on `channel`, Pa: P_AC about its rest value, P_DC above its no-contact value. `counts` may
-    /// be a mean.
-    pub fn pascals(&self, channel: Channel, counts: f32) -> f32 {
-        let (rest, pa_per_count) = self.line(channel);
-        (counts - rest) * pa_per_count
-    }
-
-    /// The reading of `pa` pascals on `channel`: the inverse of [`Calibration::pascals`], rounded, and clipped as the
-    /// converter clips.
-    pub fn counts(&self, channel: Channel, pa: f32) -> Counts {
-        let (rest, pa_per_count) = self.line(channel);
-        Counts::saturating(rest + pa / pa_per_count)
-    }
-
-    fn line(&self, channel: Channel) -> (f32, f32) {
-        match channel {
-            Channel::Pac => (self.pac_rest, self.pac_pa_per_count),
-            Channel::Pdc => (self.pdc_no_contact, self.pdc_pa_per_count),
-        }
-    }
-
-    /// Contact force at `pdc` counts of P_DC (fig. 3). One count is 5.7 % of 0.2 N: give a mean over 10 ms or more.
-    ///
-    /// Not-a-number is reported as beyond the linear range, the side on which the finger is lifted.
-    pub fn force(&self, pdc: f32) -> Force {
-        let mn = (pdc - self.pdc_no_contact) * self.force_mn_per_count;
-        Force {
-            mn,
-            beyond_linear: mn > self.linear_mn || mn.is_nan(),
-        }
-    }
-
-    /// Counts of P_DC above the no-contact value at which the lever stops for a contact force of `force_mn` mN. Not
-    /// rounded: a mean of P_DC resolves less than a count, and 2 N rounded to 174 counts would read as 2001 mN, beyond
-    /// the linear range.
-    ///
-    /// # Errors
-    /// The force is beyond the linear range.
-    pub fn force_counts(&self, force_mn: u16) -> Result<f32, BeyondLinear> {
+    /// Counts of P_DC above the no-contact value at a contact force (fig. 3), where the lever stops; `None` beyond the
+    /// linear range. Not rounded: a mean of P_DC resolves less than a count, and 2 N rounded to 174 counts would read
+    /// as 2001 mN, beyond the linear range.
+    pub(crate) fn force_counts(&self, force_mn: u16) -> Option<f32> {
         let mn = f32::from(force_mn);
-        if mn <= self.linear_mn {
-            Ok(mn / self.force_mn_per_count)
-        } else {
-            Err(BeyondLinear {
-                force_mn,
-                linear_mn: self.linear_mn,
-            })
-        }
+        (mn <= self.linear_mn).then_some(mn / self.force_mn_per_count)
     }
-}
-
-/// The requested force lies beyond the range that P_DC can measure.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-#[error(
-    "contact force {force_mn} mN is beyond {linear_mn} mN, where the skin touches the core: ask for less"
-)]
-pub struct BeyondLinear {
-    /// The force asked for, mN.
-    pub force_mn: u16,
-    /// The end of the linear range, mN.
-    pub linear_mn: f32,
 }
 
 /// The faults of a calibration record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum CalibrationError {
-    /// A scale, or the end of the linear range, is not a number above 0, or no finger has so many mN per count.
     #[error(
         "a scale of the calibration is absurd (a count of P_DC is 5.75 to 23 mN; below 0, a load cell's signal wires are swapped): \
          calibrate again"
     )]
     Scale,
-    /// P_AC at rest is outside the converter's range.
     #[error("P_AC at rest is outside 0..4095 counts: measure it again without contact")]
     PacRest,
-    /// P_DC without contact is outside the converter's range, or leaves too little of it for the linear range.
     #[error(
         "P_DC without contact leaves no room for the linear range below 4095 counts: \
          lift the finger and measure it again; if it stays, the sensor is over-inflated or broken"
@@ -250,7 +176,6 @@ pub enum CalibrationError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::string::ToString;
 
     const C: Calibration = Calibration::PAPER;
 
@@ -266,31 +191,10 @@ mod tests {
     }
 
     #[test]
-    fn pascals_count_from_the_rest_values() {
-        assert_eq!(C.pascals(Channel::Pac, 2048.0), 0.0);
-        assert_eq!(C.pascals(Channel::Pdc, 2593.0), 0.0);
-        assert!((C.pascals(Channel::Pac, 0.0) + 764.0).abs() < 0.5);
-        assert!((C.pascals(Channel::Pac, 2021.0) + 27.0 * 0.373).abs() < 0.01);
-        assert!((C.pascals(Channel::Pdc, 2603.0) - 369.6).abs() < 0.05);
-    }
-
-    #[test]
-    fn every_reading_survives_pascals_and_back() {
-        for value in 0..=4095 {
-            let counts = Counts::new(value).unwrap();
-            for channel in Channel::PATTERN {
-                let pa = C.pascals(channel, f32::from(value));
-                assert_eq!(C.counts(channel, pa), counts);
-            }
-        }
-    }
-
-    #[test]
-    fn pressures_beyond_the_converter_clip() {
-        assert_eq!(C.counts(Channel::Pac, 800.0), Counts::MAX);
-        assert_eq!(C.counts(Channel::Pac, -800.0), Counts::MIN);
-        assert_eq!(C.counts(Channel::Pdc, 1e6), Counts::MAX);
-        assert_eq!(C.counts(Channel::Pdc, f32::NEG_INFINITY), Counts::MIN);
+    fn counts_have_twelve_bits_and_clip_at_their_ends() {
+        assert_eq!(Counts::new(4095), Some(Counts::MAX));
+        assert_eq!(Counts::new(4096), None);
+        assert_eq!(Counts::from_low_bits(0xFABC).get(), 0x0ABC);
         for value in 0..=4095 {
             let clipped = Counts::new(value).unwrap().is_clipped();
             assert_eq!(clipped, value == 0 || value == 4095);
@@ -298,72 +202,19 @@ mod tests {
     }
 
     #[test]
-    fn counts_have_twelve_bits() {
-        assert_eq!(Counts::new(4095), Some(Counts::MAX));
-        assert_eq!(Counts::new(4096), None);
-        assert_eq!(Counts::from_low_bits(0xFABC).get(), 0x0ABC);
-        assert_eq!(Counts::saturating(17.5).get(), 18);
-        assert_eq!(Counts::saturating(17.4).get(), 17);
-        assert_eq!(Counts::saturating(1e9), Counts::MAX);
-        assert_eq!(Counts::saturating(f32::NAN), Counts::MIN);
-    }
-
-    #[test]
-    fn target_forces_give_the_worked_counts() {
+    fn target_forces_give_the_worked_counts_and_none_beyond_2_n() {
         for (force_mn, counts) in [(200, 17), (500, 43), (1260, 110), (2000, 174)] {
             let above_rest = C.force_counts(force_mn).unwrap();
             assert_eq!(libm::roundf(above_rest) as u16, counts);
-            let force = C.force(C.pdc_no_contact + above_rest);
-            assert!((force.mn - f32::from(force_mn)).abs() < 0.02);
         }
-        assert!(
-            (C.force_counts(200).unwrap() - 17.391).abs() < 1e-3,
-            "unrounded"
-        );
-    }
-
-    #[test]
-    fn one_count_is_11_5_mn_and_5_7_percent_of_the_lightest_touch() {
-        assert_eq!(C.force(2594.0).mn, 11.5);
-        assert!((C.force(2594.0).mn / 200.0 - 0.0575).abs() < 1e-6);
-        assert_eq!(C.force(2591.0).mn, -23.0, "drift below rest is shown");
-        // the whole count nearest to 2 N is already beyond it
-        assert_eq!(C.force(2593.0 + 174.0).mn, 2001.0);
-        assert!(C.force(2593.0 + 174.0).beyond_linear);
-    }
-
-    #[test]
-    fn beyond_2_n_is_flagged_and_never_a_target() {
-        let half = Calibration {
-            pdc_no_contact: 0.0,
-            force_mn_per_count: 10.0,
-            ..C
-        };
-        assert!(
-            !half.force(200.0).beyond_linear,
-            "2 N itself is still linear"
-        );
-        assert!(half.force(200.1).beyond_linear);
-        assert!((half.force(210.0).mn - 2100.0).abs() < 1e-3);
-        assert!(half.force(f32::NAN).beyond_linear);
-        assert!(!half.force(-5.0).beyond_linear);
-        assert_eq!(half.force_counts(2000), Ok(200.0));
-        let beyond = BeyondLinear {
-            force_mn: 2001,
-            linear_mn: 2000.0,
-        };
-        assert_eq!(half.force_counts(2001), Err(beyond));
-        assert!(beyond.to_string().contains("2001 mN is beyond 2000 mN"));
+        let unrounded = C.force_counts(200).unwrap();
+        assert!((unrounded - 17.391).abs() < 1e-3);
+        assert_eq!(C.force_counts(2001), None);
     }
 
     #[test]
     fn a_calibration_that_would_press_for_ever_is_refused() {
         assert_eq!(C.check(), Ok(()));
-        let with = |change: fn(&mut Calibration)| {
-            let mut c = C;
-            change(&mut c);
-            c.check()
-        };
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             for scale in 0..4 {
                 let mut c = C;
@@ -376,19 +227,23 @@ mod tests {
                 assert_eq!(c.check(), Err(CalibrationError::Scale), "{scale} {bad}");
             }
         }
-        for bad in [0.0, 4095.0, f32::NAN] {
-            let c = Calibration { pac_rest: bad, ..C };
-            assert_eq!(c.check(), Err(CalibrationError::PacRest), "{bad}");
+        for pac_rest in [0.0, 4095.0, f32::NAN] {
+            let c = Calibration { pac_rest, ..C };
+            assert_eq!(c.check(), Err(CalibrationError::PacRest), "{pac_rest}");
         }
-        for bad in [0.0, 3921.5, f32::NAN] {
-            let c = Calibration {
-                pdc_no_contact: bad,
+        let no_contact = |pdc_no_contact| {
+            Calibration {
+                pdc_no_contact,
                 ..C
-            };
-            assert_eq!(c.check(), Err(CalibrationError::PdcNoContact), "{bad}");
+            }
+            .check()
+        };
+        for bad in [0.0, 3921.5, f32::NAN] {
+            let refused = Err(CalibrationError::PdcNoContact);
+            assert_eq!(no_contact(bad), refused, "{bad}");
         }
         // 2 N are 173.9 counts: 3921 is the last whole count with room for them
-        assert_eq!(with(|c| c.pdc_no_contact = 3921.0), Ok(()));
+        assert_eq!(no_contact(3921.0), Ok(()));
         // exactly full scale is already too much: a clipped reading is no reading
         let exact = Calibration {
             pdc_no_contact: 3895.0,
@@ -396,15 +251,5 @@ mod tests {
             ..C
         };
         assert_eq!(exact.check(), Err(CalibrationError::PdcNoContact));
-        for error in [
-            CalibrationError::Scale,
-            CalibrationError::PacRest,
-            CalibrationError::PdcNoContact,
-        ] {
-            assert!(
-                error.to_string().contains("again"),
-                "{error} says what to do"
-            );
-        }
     }
 }

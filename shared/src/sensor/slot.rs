@@ -1,5 +1,5 @@
-//! The transactions of a slot as plain data: chip selects, bytes and gaps. The owner of the bus carries them out: a
-//! driver over embedded-hal ([`Driver`](crate::sensor::Driver)), the firmware's interrupts, a simulated finger.
+//! The transactions of a slot as plain data: chip selects, bytes and gaps. The owner of the bus carries them out:
+//! The firmware's interrupts, a simulated finger, or [`perform`] over whatever bus there is.
 
 use core::ops::RangeInclusive;
 
@@ -28,7 +28,7 @@ impl Port {
 /// One period of chip select, and the pause after it. Most significant bit first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transaction {
-    /// Whose chip select: an index into [`PressureSensor::PORTS`](crate::sensor::PressureSensor::PORTS).
+    /// Whose chip select: an index into [`FingerParts::ports`](crate::sensor::FingerParts::ports).
     pub port: u8,
     /// Bytes to send, at most [`MAX_BYTES`]; as many come in meanwhile.
     pub out: &'static [u8],
@@ -41,15 +41,12 @@ pub struct Transaction {
 /// Most bytes of a transaction, and of the answers of a slot.
 pub const MAX_BYTES: usize = 16;
 
-/// A sentence.
-type Text = heapless::String<120>;
-
 /// The answers of a slot's transactions, one after the other.
 pub type Answer = heapless::Vec<u8, MAX_BYTES>;
 
 impl Transaction {
     /// A transaction with the first part of a finger.
-    pub const fn first_port(out: &'static [u8], answer: u8, gap_us: u32) -> Self {
+    pub(crate) const fn first_port(out: &'static [u8], answer: u8, gap_us: u32) -> Self {
         Self {
             port: 0,
             out,
@@ -58,12 +55,6 @@ impl Transaction {
         }
     }
 
-    /// Returns whether the byte at an index belongs to the answer.
-    pub const fn answers_at(&self, index: usize) -> bool {
-        index + self.answer as usize >= self.out.len()
-    }
-
-    /// Puts the bytes to send into a buffer: they are what a transfer in place needs.
     pub(super) fn bytes<'a>(&self, buffer: &'a mut [u8; MAX_BYTES]) -> &'a mut [u8] {
         let bytes = buffer.get_mut(..self.out.len()).unwrap_or_default();
         bytes
@@ -73,7 +64,6 @@ impl Transaction {
         bytes
     }
 
-    /// Adds those of the incoming bytes that belong to the answer.
     pub(super) fn add_to(&self, answer: &mut Answer, came_in: &[u8]) {
         let first = came_in.len().saturating_sub(self.answer.into());
         // there is room for all answers of a slot
@@ -93,10 +83,20 @@ pub struct StartStep {
 }
 
 impl StartStep {
+    pub(super) const fn new(
+        transaction: Transaction,
+        expect: &'static [(u8, u8)],
+        wait_us: u32,
+    ) -> Self {
+        Self {
+            transaction,
+            expect,
+            wait_us,
+        }
+    }
+
     /// Checks the answer against the expected bits.
-    ///
-    /// # Errors
-    /// The first byte that is wrong or missing.
+    /// Errors: the first byte that is wrong or missing.
     pub fn check(&self, ports: &[Port], answer: &[u8]) -> Result<(), Unexpected> {
         for (at, (mask, want)) in self.expect.iter().enumerate() {
             let got = answer.get(at).copied().unwrap_or(0xFF);
@@ -115,7 +115,11 @@ impl StartStep {
 }
 
 /// A part of a finger gives a wrong answer during start-up.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error(
+    "the {part} answers {got:02X} to {sent:02X} and not {want:02X}: check its power, its wires, its chip select and the SPI \
+     mode"
+)]
 pub struct Unexpected {
     /// The part.
     pub part: &'static str,
@@ -127,55 +131,9 @@ pub struct Unexpected {
     pub want: u8,
 }
 
-impl core::error::Error for Unexpected {}
-
-impl core::fmt::Display for Unexpected {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(&self.sentence())
-    }
-}
-
-impl Unexpected {
-    /// The fault, and the advice what to check. Assembled by hand: on a chip, the formatting machinery is a kilobyte.
-    pub fn sentence(&self) -> Text {
-        const DIGITS: &str = "0123456789ABCDEF";
-        let hex = |byte: u8| {
-            let digit = |nibble: u8| {
-                DIGITS
-                    .get(nibble.into()..=nibble.into())
-                    .unwrap_or_default()
-            };
-            [digit(byte >> 4), digit(byte & 0xF)]
-        };
-        let [got, sent, want] = [self.got, self.sent, self.want].map(hex);
-        let parts = [
-            "the ",
-            self.part,
-            " answers ",
-            got[0],
-            got[1],
-            " to ",
-            sent[0],
-            sent[1],
-            " and not ",
-            want[0],
-            want[1],
-            ": check its power, its wires, its chip select and the SPI mode",
-        ];
-        let mut sentence = Text::new();
-        for part in parts {
-            // a part with a long name costs the end
-            let _ = sentence.push_str(part);
-        }
-        sentence
-    }
-}
-
 /// Carries out transactions one after the other, and returns their answers. `transact` gets the bytes to send, replaces
 /// them by the incoming ones, and keeps the gap after the transaction.
-///
-/// # Errors
-/// The first error of `transact`; the transactions after it are not carried out.
+/// Errors: the first error of `transact`; the transactions after it are not carried out.
 pub fn perform<E>(
     transactions: &[Transaction],
     mut transact: impl FnMut(&Transaction, &mut [u8]) -> Result<(), E>,

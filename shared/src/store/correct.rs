@@ -13,9 +13,9 @@ impl Checksum {
         by >> 1 ^ if by & 1 == 1 { self.polynomial } else { 0 }
     }
 
-    /// Flips the fewest bits, at most `most` of them, that make `word` whole: its bytes, and their checksum behind them.
-    /// `syndrome` is the checksum as computed, exclusive-or the one that is there. Whether there are such bits; the answer
-    /// is right if fewer bits are wrong than the code's distance less `most`.
+    /// Flips the fewest bits, at most `most` of them, that make `word` whole: its bytes, and their checksum behind
+    /// them. `syndrome` is the checksum as computed, exclusive-or the one that is there. Whether there are such bits;
+    /// the answer is right if fewer bits are wrong than the code's distance less `most`.
     pub(super) fn correct(self, word: &mut [u8], syndrome: u32, most: u8) -> bool {
         (1..=most).any(|bits| self.find(word, 8 * word.len(), self.highest, syndrome, bits))
     }

@@ -6,10 +6,9 @@ use super::correct::Checksum;
 use crate::CRC32;
 use crate::table::TableError;
 
-/// Bytes that the flash programs at once.
 pub(super) const WORD: usize = 4;
-/// Where the sectors of a store begin and end, in the smallest of them: two for small tables, two of the settings, two for
-/// larger tables. So bank 2 of an STM32F42x begins; a flash of equal sectors erases several for one.
+/// Where the sectors of a store begin and end, in the smallest of them: two for small tables, two of the settings, two
+/// for larger tables. So bank 2 of an STM32F42x begins; a flash of equal sectors erases several for one.
 pub const SECTORS: [(u32, u32); 6] = [
     Slot::A.place(),
     Slot::B.place(),
@@ -18,14 +17,12 @@ pub const SECTORS: [(u32, u32); 6] = [
     Slot::C.place(),
     Slot::D.place(),
 ];
-/// All of them.
 pub(super) const UNITS: usize = 16;
 /// Version of the records and of the map they are in (`sequential-storage` 8).
 pub const SCHEMA: u16 = 1;
 pub(super) const MAGIC: u32 = u32::from_le_bytes(*b"SLOT");
 pub(super) const LAYOUT: u32 = 1;
 pub(super) const COMMIT: u32 = u32::from_le_bytes(*b"COMM");
-/// Header without the commit word.
 pub(super) const HEADER: usize = 24;
 pub(super) const COMMIT_AT: u32 = 28;
 /// Where the table begins in its sector.
@@ -44,7 +41,6 @@ pub struct StoredTable {
     pub generation: u32,
 }
 
-/// A place for a table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Slot {
     A,
@@ -57,20 +53,8 @@ impl Slot {
     pub(super) const ALL: [Self; 4] = [Self::A, Self::B, Self::C, Self::D];
     /// The two that take turns with tables which fit into the smallest sectors: those are erased the soonest.
     pub(super) const SMALL: [Self; 2] = [Self::A, Self::B];
-    /// The two for longer ones.
     pub(super) const LARGE: [Self; 2] = [Self::C, Self::D];
 
-    /// All of them in turn.
-    pub(super) fn next(self) -> Self {
-        match self {
-            Self::A => Self::B,
-            Self::B => Self::C,
-            Self::C => Self::D,
-            Self::D => Self::A,
-        }
-    }
-
-    /// Where its sector begins and ends, in the smallest sectors.
     const fn place(self) -> (u32, u32) {
         match self {
             Self::A => (0, 1),
@@ -93,13 +77,11 @@ impl Slot {
         self.place().0 * F::ERASE_SIZE as u32
     }
 
-    /// Where its sector ends.
     pub(super) const fn end<F: NorFlash>(self) -> u32 {
         self.place().1 * F::ERASE_SIZE as u32
     }
 }
 
-/// A table on its way into the flash.
 pub(super) struct Push {
     pub(super) slot: Slot,
     pub(super) length: usize,
@@ -143,15 +125,14 @@ impl Slots {
     }
 }
 
-/// Of a slot's header.
 const HEADER_SUM: Checksum = Checksum {
     polynomial: 0xEDB8_8320,
     highest: 1 << 31,
 };
-/// Bits of a header and of a commit word that may be wrong: less than half of the distance of the header's code, which is 7.
+/// Bits of a header and of a commit word that may be wrong: less than half of the distance of the header's code, which
+/// is 7.
 const WRONG: u8 = 3;
 
-/// Whether a slot was committed.
 pub(super) fn is_committed(word: u32) -> bool {
     (word ^ COMMIT).count_ones() <= WRONG.into()
 }

@@ -1,9 +1,10 @@
 //! What has other bits than it was written with.
 //!
 //! `sequential-storage` passes over a record that does not have its checksum, and the one before it would be in force
-//! again without a word. Here every record is looked at once more, at boot. One that a newer one has replaced is no loss. Of
-//! the others, up to two bits are put right by the checksum, and the record is stored anew, because a flash can only clear
-//! bits. What cannot be put right is told. A record that a power cut has left unfinished ends with a blank word.
+//! again without a word. Here every record is looked at once more, at boot. One that a newer one has replaced is no
+//! loss. Of the others, up to two bits are put right by the checksum, and the record is stored anew, because a flash
+//! can only clear bits. What cannot be put right is told. A record that a power cut has left unfinished ends with a
+//! blank word.
 
 use embedded_storage_async::nor_flash::{NorFlash, ReadNorFlash};
 use heapless::Vec;
@@ -15,13 +16,11 @@ use super::pages::{Pages, page_size};
 use super::records::RECORD;
 use super::sectors::Store;
 
-/// Of a record's data (`sequential-storage` 8).
 const DATA: Checksum = Checksum {
     polynomial: 0x82F6_3B78,
     highest: 1 << 31,
 };
 const DATA_FIRST: u32 = 0xEEEE_EEEE;
-/// Of its length.
 const LENGTH: Checksum = Checksum {
     polynomial: 0x1A2E,
     highest: 1 << 15,
@@ -34,12 +33,9 @@ const MOST: u8 = 2;
 /// Records that are kept in mind: as many as bits that the flash may have lost.
 const KEPT: usize = 3;
 
-/// What there is at a place of a page.
 struct Item {
     key: u8,
-    /// Bytes of key and record.
     bytes: usize,
-    /// Bytes to the next place.
     next: usize,
     state: State,
 }
@@ -55,12 +51,9 @@ enum State {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Puts bits right that have changed by themselves, up to three of a table's header and two of a record; to be called once,
-    /// after opening. What could not be put right, [`Store::damaged_table`] and [`Store::damaged_record`] tell. A store that
-    /// is not mended passes over all that is damaged, and what was stored before it is in force.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    /// Puts bits right that have changed by themselves, up to three of a table's header and two of a record; to be
+    /// called once, after opening. What could not be put right, [`Store::damaged_table`] and [`Store::damaged_record`]
+    /// tell. A store that is not mended passes over all that is damaged, and what was stored before it is in force.
     pub async fn mend(&mut self) -> Result<(), StoreError> {
         self.find_tables(correct_header).await?;
         self.mend_records().await?;
@@ -112,7 +105,8 @@ impl<F: NorFlash> Store<F> {
         read.map_err(StoreError::flash)
     }
 
-    /// What there is at `at`, key and record at the beginning of `word`; `None` where nothing more is written before `end`.
+    /// What there is at `at`, key and record at the beginning of `word`; `None` where nothing more is written before
+    /// `end`.
     async fn item(
         &mut self,
         at: u32,
@@ -178,7 +172,8 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
-/// The length in front of a record, by its checksum behind it, and whether no bit of them had changed; 0 where there is none.
+/// The length in front of a record, by its checksum behind it, and whether no bit of them had changed; 0 where there is
+/// none.
 fn length_of(mut word: [u8; WORD]) -> (usize, bool) {
     let [low, high, a, b] = word;
     let computed = LENGTH.remainder(&[low, high], LENGTH_FIRST) ^ LENGTH_FIRST;

@@ -1,17 +1,15 @@
 //! The two sectors of the settings, as `sequential-storage` sees them: pages that are a little smaller than a sector.
 //!
 //! `sequential-storage` fills one page, copies what is still valid to the other one, and erases the first. A cut in the
-//! middle of that erase can leave any words of the old page, and it cannot tell such a page from one whose copying was cut
-//! short: it would erase the copy. The last words of every sector, which it does not see, say what is going on. Erasing
-//! a sector can turn their bits into ones in any order, so a state counts only when its word matches exactly.
+//! middle of that erase can leave any words of the old page, and it cannot tell such a page from one whose copying was
+//! cut short: it would erase the copy. The last words of every sector, which it does not see, say what is going on.
+//! Erasing a sector can turn their bits into ones in any order, so a state counts only when its word matches exactly.
 
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 
 use super::layout::WORD;
 
-/// The other page is being erased.
 const ERASING: [u8; WORD] = *b"eras";
-/// All settings are being erased.
 const WIPING: [u8; WORD] = *b"wipe";
 const DONE: [u8; WORD] = [0; WORD];
 /// Bytes at the end of a sector that are not the page's.
@@ -19,12 +17,10 @@ const TRAILER: usize = 16;
 /// `sequential-storage` takes a page for a used one from so many zero bits on in the page's first word.
 const MARKED: u32 = 4;
 
-/// Bytes of a page.
 pub(super) const fn page_size<F: NorFlash>() -> usize {
     F::ERASE_SIZE - TRAILER
 }
 
-/// The pages of the settings.
 pub(super) struct Pages<'f, F>(pub(super) &'f mut F);
 
 #[derive(Clone, Copy)]
@@ -37,14 +33,12 @@ enum Word {
 
 impl<F: NorFlash> Pages<'_, F> {
     const SIZE: usize = page_size::<F>();
-    /// Sector of the first page.
     const FIRST: u32 = 2;
 
     fn sector(page: u32) -> u32 {
         (Self::FIRST + page) * F::ERASE_SIZE as u32
     }
 
-    /// Place in the flash of a place in the pages.
     fn place(offset: u32) -> u32 {
         let size = Self::SIZE as u32;
         Self::sector(offset / size) + offset % size
@@ -75,8 +69,8 @@ impl<F: NorFlash> Pages<'_, F> {
 
     async fn erase_page(&mut self, page: u32) -> Result<(), F::Error> {
         let other = 1 - page;
-        // A page erases the other one once for good; where it has done so, what is erased now is an unfinished copy of it,
-        // and half a copy cannot be mistaken for anything else.
+        // A page erases the other one once for good; where it has done so, what is erased now is an unfinished copy of
+        // it, and half a copy cannot be mistaken for anything else.
         if self.word(other, Word::Erase).await? == DONE {
             return self.erase_sector(page).await;
         }
@@ -109,7 +103,6 @@ impl<F: NorFlash> Pages<'_, F> {
         Ok(())
     }
 
-    /// Erases all settings.
     pub(super) async fn wipe(&mut self) -> Result<(), F::Error> {
         self.mark(0, Word::Wipe, WIPING).await?;
         self.erase_sector(1).await?;

@@ -1,7 +1,6 @@
 //! The records of the settings: their keys, their sizes, and how they are read.
 
 use core::marker::PhantomData;
-use core::ops::Range;
 
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::key_pointers::ArrayKeyPointers;
@@ -34,7 +33,6 @@ pub(super) const KEY_HIGH_FORCE: u8 = 4;
 pub(super) const KEY_TRAINED: u8 = 16;
 /// The first of the textures that the probe learned by itself, one each.
 pub(super) const KEY_SELF: u8 = 64;
-/// One past the last key.
 pub(super) const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;
 /// The longest record with its key, in whole words: one of training takes 99 bytes, a self-learned one 106.
 pub(super) const RECORD: usize = 112;
@@ -54,9 +52,7 @@ pub struct TrainingRecord {
 
 /// A record of which the settings hold several, each at a place of its own.
 pub(super) trait Record: Serialize + for<'b> Deserialize<'b> {
-    /// Key of the first place.
     const FIRST: u8;
-    /// How many places there are.
     const PLACES: u8;
 
     /// Whether this record takes the place of `old`.
@@ -109,9 +105,9 @@ pub struct SelfLearnedRecord {
     pub movements: heapless::Vec<(u8, u8, Whitened), SELF_MOVEMENTS>,
 }
 
-/// Remembers where the newest record of every key is, for one call. Without it, `sequential-storage` reads the whole page
-/// for every record that it copies to the next page.
-pub(super) type Places = Cache<Uncached, Uncached, ArrayKeyPointers<u8, KEYS>, u8>;
+/// Remembers where the newest record of every key is, for one call. Without it, `sequential-storage` reads the whole
+/// page for every record that it copies to the next page.
+type Places = Cache<Uncached, Uncached, ArrayKeyPointers<u8, KEYS>, u8>;
 
 pub(super) type Map<'f, F> = MapStorage<u8, Pages<'f, F>, Places>;
 type Items<'m, 'f, F> = map::MapItemIter<'m, u8, Pages<'f, F>, Places>;
@@ -130,33 +126,14 @@ impl<'m, 'f, F: NorFlash, T: Record> Records<'m, 'f, F, T> {
 
     /// Place and record, `None` for a place that was cleared.
     pub(super) async fn next(&mut self) -> Result<Option<(u8, Option<T>)>, StoreError> {
-        let mut record = None;
-        let mut decode = |bytes: &[u8]| {
-            record = postcard::from_bytes(bytes).ok();
-            record.is_some()
-        };
-        let keys = T::FIRST..T::FIRST + T::PLACES;
-        let key = next(&mut self.items, keys, &mut decode).await?;
-        Ok(key.map(|key| key - T::FIRST).zip(record))
-    }
-}
-
-/// The next record with one of these keys, whatever its type is: `decode` says whether the bytes are a record.
-pub(super) async fn next<F: NorFlash>(
-    items: &mut Items<'_, '_, F>,
-    keys: Range<u8>,
-    decode: &mut dyn FnMut(&[u8]) -> bool,
-) -> Result<Option<u8>, StoreError> {
-    let mut buffer = [0; RECORD];
-    while let Some((key, bytes)) = items.next::<&[u8]>(&mut buffer).await? {
-        if keys.contains(&key) {
-            return match decode(bytes) {
-                true => Ok(Some(key)),
-                false => Err(SettingsError::Corrupt.into()),
-            };
+        let mut buffer = [0; RECORD];
+        while let Some((key, bytes)) = self.items.next::<&[u8]>(&mut buffer).await? {
+            if (T::FIRST..T::FIRST + T::PLACES).contains(&key) {
+                return Ok(Some((key - T::FIRST, decode(bytes)?)));
+            }
         }
+        Ok(None)
     }
-    Ok(None)
 }
 
 pub(super) fn decode<'b, T: Deserialize<'b>>(bytes: &'b [u8]) -> Result<T, StoreError> {

@@ -1,14 +1,16 @@
-//! A store's flash, and what is known of its sectors.
+//! A store: its flash, and the state of its sectors.
 
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::error::{SettingsError, StoreError};
-use super::layout::{Slots, WORD};
+use super::layout::{Slots, UNITS, WORD};
 
-/// Tables and settings in the first sectors of a flash. [`super::SECTORS`] are erased, each as a whole; `F::ERASE_SIZE` is the
-/// size of the smallest.
+/// Tables and settings in the first sectors of a flash. [`super::SECTORS`] are erased, each as a whole; `F::ERASE_SIZE`
+/// is the size of the smallest.
 ///
-/// The flash programs words of one, two or four bytes and reads as many or fewer.
+/// The flash programs words of one, two or four bytes and reads as many or fewer. Each function may fail with
+/// [`StoreError::Flash`], those of settings with [`StoreError::Settings`], and those that write with
+/// [`StoreError::Worn`].
 pub struct Store<F> {
     pub(super) flash: F,
     pub(super) slots: Slots,
@@ -19,24 +21,45 @@ pub struct Store<F> {
 }
 
 impl<F: NorFlash> Store<F> {
-    pub(super) const CHECK: () = assert!(
+    const CHECK: () = assert!(
         WORD.is_multiple_of(F::WRITE_SIZE)
             && WORD.is_multiple_of(F::READ_SIZE)
             && F::ERASE_SIZE.is_multiple_of(WORD)
             && F::ERASE_SIZE >= 256
     );
 
-    pub(super) async fn read(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(), StoreError> {
+    /// Opens the store, and finishes what a power cut has interrupted. Blank flash is an empty store. [`Store::mend`]
+    /// is due.
+    ///
+    /// Settings that cannot be read are no error here, see [`Store::settings`]: tables can be used without them.
+    pub async fn open(flash: F) -> Result<Self, StoreError> {
+        let () = Self::CHECK;
+        let mut store = Self {
+            flash,
+            slots: Slots::default(),
+            settings: Err(SettingsError::Corrupt),
+            lost: None,
+        };
+        if store.flash.capacity() < UNITS * F::ERASE_SIZE {
+            return Err(StoreError::NoSpace(store.flash.capacity()));
+        }
+        store.find_tables(|_| ()).await?;
+        store.open_settings().await?;
+        Ok(store)
+    }
+
+    /// Gives the flash back.
+    pub fn close(self) -> F {
         self.flash
-            .read(offset, buffer)
-            .await
-            .map_err(StoreError::flash)
+    }
+
+    pub(super) async fn read(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(), StoreError> {
+        let done = self.flash.read(offset, buffer).await;
+        done.map_err(StoreError::flash)
     }
 
     pub(super) async fn program(&mut self, offset: u32, words: &[u8]) -> Result<(), StoreError> {
-        self.flash
-            .write(offset, words)
-            .await
-            .map_err(StoreError::flash)
+        let done = self.flash.write(offset, words).await;
+        done.map_err(StoreError::flash)
     }
 }

@@ -1,19 +1,17 @@
 //! The settings: one record per key in a `sequential-storage` map.
 
-use core::ops::Range;
-
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::key_pointers::ArrayKeyPointers;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::{Setting, SettingsError, StoreError};
 use super::layout::SCHEMA;
 use super::pages::{Pages, page_size};
 use super::records::{
     KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_HIGH_FORCE, KEY_SCHEMA, KEY_SELF, KEY_SKIN, KEY_TRAINED,
-    Map, RECORD, Record, Records, SelfLearnedRecord, TrainingRecord, decode, next,
+    Map, RECORD, Record, Records, SelfLearnedRecord, TrainingRecord, decode,
 };
 use super::sectors::Store;
 use crate::features::Movement;
@@ -35,29 +33,15 @@ enum Use {
     Same,
 }
 
-/// How the place of a record with these bytes is used; `None`: they are no record.
-type Seen<'s> = &'s dyn Fn(&[u8]) -> Option<Use>;
-
-fn seen<T: Record>(bytes: &[u8], of: &dyn Fn(&T) -> Use) -> Option<Use> {
-    let record: Option<T> = postcard::from_bytes(bytes).ok()?;
-    Some(record.as_ref().map_or(Use::Free, of))
-}
-
-const fn keys<T: Record>() -> Range<u8> {
-    T::FIRST..T::FIRST + T::PLACES
-}
-
 impl<F: NorFlash> Store<F> {
     /// Whether the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.
-    ///
-    /// # Errors
-    /// Why not.
+    /// Errors: why not.
     pub fn settings(&self) -> Result<(), SettingsError> {
         self.settings.map(|_| ())
     }
 
-    /// What of the settings [`Store::mend`] could not put right, and is as it was before; it ends with the next record of its
-    /// kind.
+    /// What of the settings [`Store::mend`] could not put right, and is as it was before; it ends with the next record
+    /// of its kind.
     pub fn damaged_record(&self) -> Option<SettingsError> {
         self.lost.map(|key| {
             SettingsError::Record(match key {
@@ -71,9 +55,6 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Erases all settings: calibration, skin care, false alarm and unfinished training.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`].
     pub async fn erase_settings(&mut self) -> Result<(), StoreError> {
         self.settings = Err(SettingsError::Corrupt);
         self.lost = None;
@@ -85,9 +66,6 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// The calibration of this rig; `None` if there was none.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Calibration`].
     pub async fn calibration(&mut self) -> Result<Option<RigCalibration>, StoreError> {
         let mut buffer = [0; RECORD];
         let Some(bytes) = self.fetch(KEY_CALIBRATION, &mut buffer).await? else {
@@ -99,10 +77,8 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Stores the calibration of this rig.
-    ///
-    /// # Errors
-    /// [`StoreError::Calibration`] for one that could not be used, [`StoreError::Flash`], [`StoreError::Settings`],
-    /// [`StoreError::Worn`].
+    /// Errors: [`StoreError::Calibration`] for one that could not be used, [`StoreError::Flash`],
+    /// [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_calibration(
         &mut self,
         calibration: &RigCalibration,
@@ -112,74 +88,42 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Sliding since the skin was replaced; none if nothing is stored.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`].
     pub async fn skin(&mut self) -> Result<SkinCare, StoreError> {
-        let mut buffer = [0; RECORD];
-        let Some(bytes) = self.fetch(KEY_SKIN, &mut buffer).await? else {
-            return Ok(SkinCare::default());
-        };
-        let (energy_j, wear_j) = decode(bytes)?;
+        let (energy_j, wear_j) = self.value(KEY_SKIN).await?.unwrap_or_default();
         Ok(SkinCare::after(energy_j, wear_j))
     }
 
     /// Stores the sliding since the skin was replaced.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_skin(&mut self, skin: &SkinCare) -> Result<(), StoreError> {
-        self.encode(KEY_SKIN, &(skin.energy_j(), skin.wear_j()))
-            .await
+        let record = (skin.energy_j(), skin.wear_j());
+        self.encode(KEY_SKIN, &record).await
     }
 
     /// Share of false alarms that limits are for; `None`: each table's own.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`].
     pub async fn false_alarm(&mut self) -> Result<Option<f32>, StoreError> {
-        let mut buffer = [0; RECORD];
-        let Some(bytes) = self.fetch(KEY_FALSE_ALARM, &mut buffer).await? else {
-            return Ok(None);
-        };
-        let share: Option<f32> = decode(bytes)?;
+        let share = self.value::<Option<f32>>(KEY_FALSE_ALARM).await?.flatten();
         Ok(share.filter(|share| is_false_alarm(*share)))
     }
 
     /// Stores the share of false alarms that limits are for.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_false_alarm(&mut self, share: Option<f32>) -> Result<(), StoreError> {
         self.encode(KEY_FALSE_ALARM, &share).await
     }
 
-    /// Whether movements may press with up to 2 N; never while a record is lost, see [`Store::damaged_record`]: the one before it
-    /// may have allowed what it forbade.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    /// Returns whether movements may press with up to 2 N; never while a record is lost, see [`Store::damaged_record`]:
+    /// the one before it may have allowed what it forbade.
     pub async fn high_force(&mut self) -> Result<bool, StoreError> {
-        let mut buffer = [0; RECORD];
-        match self.fetch(KEY_HIGH_FORCE, &mut buffer).await? {
-            Some(bytes) if self.lost.is_none() => decode(bytes),
-            _ => Ok(false),
-        }
+        let allowed = self.value(KEY_HIGH_FORCE).await?.unwrap_or(false);
+        Ok(allowed && self.lost.is_none())
     }
 
     /// Stores whether movements may press with up to 2 N.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn set_high_force(&mut self, allow: bool) -> Result<(), StoreError> {
         self.encode(KEY_HIGH_FORCE, &allow).await
     }
 
-    /// What the training of a texture has learned so far at a movement, on top of the table with this checksum, or of its
-    /// own only.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`].
+    /// What the training of a texture has learned so far at a movement, on top of the table with this checksum, or of
+    /// its own only.
     pub async fn training_record(
         &mut self,
         name: &str,
@@ -205,29 +149,20 @@ impl<F: NorFlash> Store<F> {
         Ok(found.map(|(_, stats)| stats))
     }
 
-    /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When space runs
-    /// out, progress on top of other tables than this record's is given up.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    /// Stores how far a training has come, in place of what was stored for this texture, movement and table. When space
+    /// runs out, progress on top of other tables than this record's is given up.
     pub async fn set_training_record(&mut self, new: &TrainingRecord) -> Result<(), StoreError> {
         self.put(new).await
     }
 
     /// Deletes the unfinished training of a texture, movement by movement: after a cut some may be left.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
     pub async fn delete_training_records(&mut self, name: &str) -> Result<(), StoreError> {
-        self.clear(&|record: &TrainingRecord| record.name == name)
+        self.clear(|record: &TrainingRecord| record.name == name)
             .await
     }
 
     /// What the probe has learned by itself of the textures of the table with this lineage, one after the other: `each`
     /// receives the newest record of every texture.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`].
     pub async fn self_learned(
         &mut self,
         lineage: u32,
@@ -261,23 +196,20 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Stores what the probe has learned by itself of a texture, in place of what was stored of it. When space runs out,
-    /// what belongs to tables of another lineage is given up.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
+    /// Stores what the probe has learned by itself of a texture, in place of what was stored of it. When space runs
+    /// out, what belongs to tables of another lineage is given up.
     pub async fn set_self_learned(&mut self, new: &SelfLearnedRecord) -> Result<(), StoreError> {
         self.put(new).await
     }
 
     /// Deletes what the probe has learned by itself: of the texture with this number of that lineage, or all of it.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Settings`], [`StoreError::Worn`].
-    pub async fn delete_self_learned(&mut self, of: Option<(u32, u16)>) -> Result<(), StoreError> {
+    pub(crate) async fn delete_self_learned(
+        &mut self,
+        of: Option<(u32, u16)>,
+    ) -> Result<(), StoreError> {
         let is_its =
             |record: &SelfLearnedRecord| of.is_none_or(|of| (record.lineage, record.number) == of);
-        self.clear(&is_its).await
+        self.clear(is_its).await
     }
 
     /// Stores a record in the place of the one that it replaces; otherwise in a free place, or in that of one that it
@@ -292,7 +224,7 @@ impl<F: NorFlash> Store<F> {
                 Use::Taken
             }
         };
-        let uses = self.uses(keys::<T>(), &|bytes| seen(bytes, &old)).await?;
+        let uses = self.uses(old).await?;
         let uses = uses.iter().take(T::PLACES.into());
         let place = [Use::Same, Use::Free, Use::Stale]
             .into_iter()
@@ -302,22 +234,13 @@ impl<F: NorFlash> Store<F> {
         self.encode(T::FIRST + place, &Some(new)).await
     }
 
-    /// Clears the places of such records.
-    async fn clear<T: Record>(&mut self, is_such: &dyn Fn(&T) -> bool) -> Result<(), StoreError> {
-        let such = |record: &T| {
-            if is_such(record) {
-                Use::Same
-            } else {
-                Use::Taken
-            }
+    async fn clear<T: Record>(&mut self, is_such: impl Fn(&T) -> bool) -> Result<(), StoreError> {
+        let such = |record: &T| match is_such(record) {
+            true => Use::Same,
+            false => Use::Taken,
         };
-        self.clear_keys(keys::<T>(), &|bytes| seen(bytes, &such))
-            .await
-    }
-
-    async fn clear_keys(&mut self, keys: Range<u8>, of: Seen<'_>) -> Result<(), StoreError> {
-        let uses = self.uses(keys.clone(), of).await?;
-        for (key, now) in keys.zip(uses) {
+        let uses = self.uses(such).await?;
+        for (key, now) in (T::FIRST..T::FIRST + T::PLACES).zip(uses) {
             if now == Use::Same {
                 self.encode(key, &None::<()>).await?;
             }
@@ -325,27 +248,21 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// How every place of records with these keys is used.
-    async fn uses(
+    async fn uses<T: Record>(
         &mut self,
-        keys: Range<u8>,
-        of: Seen<'_>,
+        of: impl Fn(&T) -> Use,
     ) -> Result<[Use; MAX_TEXTURES], StoreError> {
         self.settings?;
         let mut uses = [Use::Free; MAX_TEXTURES];
         let mut buffer = [0; RECORD];
         let mut map = self.map();
-        let mut items = map.fetch_all_items(&mut buffer).await?;
-        loop {
-            let mut now = Use::Free;
-            let mut decode = |bytes: &[u8]| of(bytes).map(|used| now = used).is_some();
-            let Some(key) = next(&mut items, keys.clone(), &mut decode).await? else {
-                return Ok(uses);
-            };
-            if let Some(slot) = uses.get_mut(usize::from(key - keys.start)) {
-                *slot = now;
+        let mut records = Records::<F, T>::new(map.fetch_all_items(&mut buffer).await?);
+        while let Some((place, record)) = records.next().await? {
+            if let Some(slot) = uses.get_mut(usize::from(place)) {
+                *slot = record.as_ref().map_or(Use::Free, &of);
             }
         }
+        Ok(uses)
     }
 
     /// Brings the pages into order, and looks whether they can be read.
@@ -357,7 +274,6 @@ impl<F: NorFlash> Store<F> {
         self.look_at_settings().await
     }
 
-    /// Looks whether the settings can be read.
     pub(super) async fn look_at_settings(&mut self) -> Result<(), StoreError> {
         self.settings = match self.read_all().await {
             Ok(schema_written) => Ok(schema_written),
@@ -411,6 +327,15 @@ impl<F: NorFlash> Store<F> {
     ) -> Result<Option<&'b [u8]>, StoreError> {
         self.settings?;
         Ok(self.map().fetch_item(buffer, &key).await?)
+    }
+
+    async fn value<T: for<'b> Deserialize<'b>>(
+        &mut self,
+        key: u8,
+    ) -> Result<Option<T>, StoreError> {
+        let mut buffer = [0; RECORD];
+        let bytes = self.fetch(key, &mut buffer).await?;
+        bytes.map(decode).transpose()
     }
 
     async fn encode(&mut self, key: u8, value: &impl Serialize) -> Result<(), StoreError> {

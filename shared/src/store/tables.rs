@@ -12,7 +12,6 @@ use crate::CRC32;
 use crate::sensor::FingerCode;
 use crate::table::{Table, TableError};
 
-/// Bytes read at a time.
 const CHUNK: usize = 128;
 
 impl<F: NorFlash> Store<F> {
@@ -21,29 +20,27 @@ impl<F: NorFlash> Store<F> {
 
     /// The table to be used: the newest one that was committed and is whole; `None`: the factory's.
     ///
-    /// The store has checked its own header and the table's checksum. [`Table::read`] checks the rest: the table may have
-    /// been written for another version of the program.
+    /// The store has checked its own header and the table's checksum. [`Table::read`] checks the rest: the table may
+    /// have been written for another version of the program.
     ///
-    /// The chip reads the bytes where they lie in the flash. They stay there until the table after the next one is begun:
-    /// after [`Store::commit_table`] or [`Store::factory_table`], no one may use the former table any more when
+    /// The chip reads the bytes where they lie in the flash. They stay there until the table after the next one is
+    /// begun: after [`Store::commit_table`] or [`Store::factory_table`], no one may use the former table any more when
     /// [`Store::begin_table`] is called again.
     pub fn table(&self) -> Option<StoredTable> {
         self.slots.active.map(|(_, table)| table)
     }
 
-    /// What is wrong with the newest table that was committed, if [`Store::table`] had to fall back on the one before it, or on
-    /// none: its bytes have changed since. It ends with the next table, and with [`Store::factory_table`].
+    /// What is wrong with the newest table that was committed, if [`Store::table`] had to fall back on the one before
+    /// it, or on none: its bytes have changed since. It ends with the next table, and with [`Store::factory_table`].
     ///
-    /// More damage to the header of the newest table than is put right is not noticed while the one before it is whole: an
-    /// erase that was interrupted leaves the same.
+    /// More damage to the header of the newest table than is put right is not noticed while the one before it is whole:
+    /// an erase that was interrupted leaves the same.
     pub fn damaged_table(&self) -> Option<TableError> {
         self.slots.damaged
     }
 
     /// Reads the table to be used into the beginning of `buffer`; `None`: the factory's is.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::Buffer`]; [`StoreError::Table`] when [`Table::read`] refuses it.
+    /// Errors: [`StoreError::Flash`], [`StoreError::Buffer`]; [`StoreError::Table`] when [`Table::read`] refuses it.
     pub async fn read_table<'r>(
         &mut self,
         buffer: &'r mut [u8],
@@ -57,11 +54,9 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Begins a table of `length` bytes: of the two slots for such tables, erases the one that is not in use, or has the older
-    /// table. The table in use stays until the new one is committed. One that was begun before and not committed is given up.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`], [`StoreError::TooLong`].
+    /// Begins a table of `length` bytes: of the two slots for such tables, erases the one that is not in use, or has
+    /// the older table. The table in use stays until the new one is committed. One that was begun before and not
+    /// committed is given up.
     pub async fn begin_table(&mut self, length: usize) -> Result<(), StoreError> {
         self.slots.push = None;
         if length > Self::MAX_TABLE {
@@ -90,11 +85,9 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Writes the next part of the table, of any size; `offset` says where it belongs. Offset and length are checked before
-    /// anything is written.
-    ///
-    /// # Errors
-    /// [`StoreError::NoTable`], [`StoreError::Part`]; [`StoreError::Flash`], after which the table must be begun anew.
+    /// Writes the next part of the table, of any size; `offset` says where it belongs. Offset and length are checked
+    /// before anything is written. Errors: [`StoreError::NoTable`], [`StoreError::Part`]; [`StoreError::Flash`], after
+    /// which the table must be begun anew.
     pub async fn write_table(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError> {
         // taken out, so that a part that fails or is cancelled ends the table
         let mut push = self.slots.push.take().ok_or(StoreError::NoTable)?;
@@ -130,24 +123,11 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Reads the new table back into the beginning of `buffer`, checks it, and commits it: from here on it is the one to be
-    /// used.
-    ///
-    /// # Errors
-    /// The former table stays then, and the new one must be begun anew, except after [`StoreError::NoTable`],
-    /// [`StoreError::Unfinished`] and [`StoreError::Buffer`].
+    /// Reads the new table back into the beginning of `buffer`, checks it, and commits it: from here on it is the one
+    /// to be used. Where a finger is given, the table must have been learned with it. Errors: the former table stays
+    /// then, and the new one must be begun anew, except after [`StoreError::NoTable`], [`StoreError::Unfinished`] and
+    /// [`StoreError::Buffer`].
     pub async fn commit_table<'r>(
-        &mut self,
-        buffer: &'r mut [u8],
-    ) -> Result<(StoredTable, Table<'r>), StoreError> {
-        self.commit_table_of(None, buffer).await
-    }
-
-    /// As [`Store::commit_table`], but only a table that was learned with this finger, where one is given.
-    ///
-    /// # Errors
-    /// Also [`TableError::Finger`].
-    pub async fn commit_table_of<'r>(
         &mut self,
         finger: Option<FingerCode>,
         buffer: &'r mut [u8],
@@ -199,11 +179,8 @@ impl<F: NorFlash> Store<F> {
         Ok((stored, table))
     }
 
-    /// Makes the table of `length` bytes at the beginning of `buffer` the one to be used; the buffer is then read back from
-    /// the flash. The former table stays in use until the new one is whole.
-    ///
-    /// # Errors
-    /// See [`Store::begin_table`], [`Store::write_table`] and [`Store::commit_table`].
+    /// Makes the table of `length` bytes at the beginning of `buffer` the one to be used; the buffer is then read back
+    /// from the flash. The former table stays in use until the new one is whole.
     pub async fn replace_table(
         &mut self,
         buffer: &mut [u8],
@@ -212,20 +189,17 @@ impl<F: NorFlash> Store<F> {
         self.begin_table(length).await?;
         let table = buffer.get(..length).unwrap_or_default();
         self.write_table(0, table).await?;
-        self.commit_table(buffer).await?;
+        self.commit_table(None, buffer).await?;
         Ok(())
     }
 
     /// Gives the stored tables up: from here on the factory's is to be used.
-    ///
-    /// # Errors
-    /// [`StoreError::Flash`].
     pub async fn factory_table(&mut self) -> Result<(), StoreError> {
         self.slots.push = None;
-        let mut slot = self.slots.active.map_or(Slot::A, |(slot, _)| slot);
+        let active = self.slots.active.map(|(slot, _)| slot);
+        let others = Slot::ALL.into_iter().filter(|slot| Some(*slot) != active);
         // the older ones first: the active one hides them until it is given up itself
-        for _ in Slot::ALL {
-            slot = slot.next();
+        for slot in others.chain(active) {
             if is_committed(self.commit_word(slot).await?) {
                 self.program(slot.start::<F>() + COMMIT_AT, &[0; WORD])
                     .await?;
@@ -237,7 +211,6 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Looks for the table to be used.
     pub(super) async fn find_tables(&mut self, correct: Correct) -> Result<(), StoreError> {
         // of the newest table that is damaged: its generation, where that can be read
         let mut damaged: Option<(Option<u32>, TableError)> = None;

@@ -32,10 +32,7 @@ fn table(n: u8) -> Vec<u8> {
         let movements = [Movement::FOR_TRACTION];
         let experience = [Table::read(&bytes).unwrap().experience(0, 0)];
         let name = &"a longer name"[..1 + usize::from(n) % 13];
-        let texture = crate::table::Texture {
-            name,
-            experience: &experience,
-        };
+        let texture = (name, &experience[..]);
         let mut out = vec![0; 1000];
         let all = crate::features::PropertySet::ALL;
         let encoded = crate::table::encode(&mut out, all, &movements, [texture].into_iter());
@@ -74,7 +71,7 @@ async fn push(store: &mut Store<Ram>, bytes: &[u8], part: usize) -> Outcome<()> 
         store.write_table(index * part, some).await?;
     }
     let mut buffer = [0; 4 * SECTOR];
-    let (stored, table) = store.commit_table(&mut buffer).await?;
+    let (stored, table) = store.commit_table(None, &mut buffer).await?;
     assert_eq!((table.as_bytes(), table.crc()), (bytes, stored.crc));
     Ok(())
 }
@@ -178,7 +175,7 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
     block_on(async {
         assert_eq!(store.write_table(0, &new).await, Err(StoreError::NoTable));
         assert_eq!(
-            store.commit_table(&mut buffer).await.err(),
+            store.commit_table(None, &mut buffer).await.err(),
             Some(StoreError::NoTable)
         );
         let too_long = StoreError::TooLong {
@@ -196,20 +193,23 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
             wanted: new.len(),
         };
         assert_eq!(
-            store.commit_table(&mut buffer).await.err(),
+            store.commit_table(None, &mut buffer).await.err(),
             Some(unfinished)
         );
         store.write_table(7, &new[7..]).await.unwrap();
-        let small = store.commit_table(&mut buffer[..new.len() - 1]).await.err();
+        let small = store
+            .commit_table(None, &mut buffer[..new.len() - 1])
+            .await
+            .err();
         assert_eq!(small, Some(StoreError::Buffer(new.len())));
-        store.commit_table(&mut buffer).await.unwrap();
+        store.commit_table(None, &mut buffer).await.unwrap();
         // a damaged one
         let mut damaged = old.clone();
         damaged[30] ^= 1;
         store.begin_table(damaged.len()).await.unwrap();
         store.write_table(0, &damaged).await.unwrap();
         assert!(matches!(
-            store.commit_table(&mut buffer).await,
+            store.commit_table(None, &mut buffer).await,
             Err(StoreError::Table(TableError::Crc { .. }))
         ));
         // one with something behind it
@@ -218,7 +218,7 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
         store.begin_table(longer.len()).await.unwrap();
         store.write_table(0, &longer).await.unwrap();
         assert!(matches!(
-            store.commit_table(&mut buffer).await,
+            store.commit_table(None, &mut buffer).await,
             Err(StoreError::Unfinished { .. })
         ));
     });
@@ -241,7 +241,7 @@ fn a_table_of_another_finger_is_refused_and_the_former_one_stays() {
         block_on(async {
             store.begin_table(other.len()).await.unwrap();
             store.write_table(0, &other).await.unwrap();
-            let committed = store.commit_table_of(Some(finger), &mut buffer).await;
+            let committed = store.commit_table(Some(finger), &mut buffer).await;
             committed.map(|(_, table)| table.finger())
         })
     };

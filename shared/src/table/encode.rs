@@ -5,30 +5,20 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::format::{
-    Action, CELL_BYTES, CRC_BYTES, Contents, LENGTH, MAGIC, MAX_MOVEMENTS, SLOPES, TableError,
-    Tally, VERSION,
+    Action, CELL_BYTES, CRC_BYTES, Contents, HEAD, LENGTH, MAGIC, MAX_MOVEMENTS, SLOPES,
+    TableError, Tally, VERSION, each,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
 use super::sections::Sections;
-use super::slopes::{self, put_slope};
 use super::training_stats::{Experience, Whitened};
 use super::view::Table;
 use super::whitening::Whitening;
 use crate::CRC32;
 use crate::features::{FeatureSet, Movement, Property, PropertySet};
 
-/// One texture of a table of Gaussians to be written.
-#[derive(Clone, Copy, Debug)]
-pub struct Texture<'a> {
-    /// Its name, unlike every other, of 1 to 255 bytes.
-    pub name: &'a str,
-    /// The training statistics, movement by movement.
-    pub experience: &'a [Experience],
-}
-
 /// The training statistics of a texture, movement by movement, as its table keeps them.
 #[derive(Clone, Copy, Debug)]
-pub enum Known<'a> {
+pub enum TextureStats<'a> {
     /// For a table of Gaussians.
     Gaussians(&'a [Experience]),
     /// For a fused table.
@@ -37,104 +27,64 @@ pub enum Known<'a> {
 
 /// A change of a table.
 #[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)] // fields whose names say it
 pub enum Change<'a> {
     /// Puts a texture in: it replaces the one of that name, or is added.
     Put {
-        /// Its name.
         name: &'a str,
-        /// Its training statistics.
-        known: Known<'a>,
-        /// From whom.
+        known: TextureStats<'a>,
         tally: Tally,
     },
     /// Another name.
-    Rename {
-        /// Index of the texture.
-        texture: u16,
-        /// Its new name.
-        name: &'a str,
-    },
+    Rename { texture: u16, name: &'a str },
     /// A texture less.
     Forget(u16),
 }
 
 /// The reasons why a table was not written.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum EncodeError {
-    /// No texture, movement or property, or more movements than [`MAX_MOVEMENTS`].
+    #[error("a table needs a texture, a property and 1 to {MAX_MOVEMENTS} movements")]
     Empty,
-    /// The statistics are of another kind than the table, or of other features.
+    #[error("what was learned does not fit this kind of table")]
     Contents,
-    /// There is no texture with this index.
+    #[error("the table has no texture {}", .0 + 1)]
     Texture(u16),
-    /// The table takes this many bytes, and the buffer is smaller.
+    #[error("the table takes {0} bytes, and there is less room")]
     NoSpace(usize),
-    /// A texture has not as many experiences as there are movements.
+    #[error("texture {} was not learned at every movement", .0 + 1)]
     Movements(u16),
-    /// A name is longer than 255 bytes.
+    #[error("the name of texture {} is longer than 255 bytes", .0 + 1)]
     Name(u16),
     /// A mean that the fixed point cannot hold.
+    #[error(fmt = range)]
     Range {
-        /// Index of the texture.
         texture: u16,
-        /// The action concerned.
         action: Action,
-        /// The mean.
         mean: f32,
     },
     /// The written table is invalid: a name is empty or there twice, or a movement is.
+    #[error(transparent)]
     Invalid(TableError),
 }
 
-impl fmt::Display for EncodeError {
-    #[inline]
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => write!(
-                f,
-                "a table needs a texture, a property and 1 to {MAX_MOVEMENTS} movements"
-            ),
-            Self::Contents => f.write_str("what was learned does not fit this kind of table"),
-            Self::Texture(texture) => write!(f, "the table has no texture {}", texture + 1),
-            Self::NoSpace(needed) => {
-                write!(f, "the table takes {needed} bytes, and there is less room")
-            }
-            Self::Movements(texture) => write!(
-                f,
-                "texture {} was not learned at every movement",
-                texture + 1
-            ),
-            Self::Name(texture) => write!(
-                f,
-                "the name of texture {} is longer than 255 bytes",
-                texture + 1
-            ),
-            Self::Range {
-                texture,
-                action,
-                mean,
-            } => {
-                // in whole numbers: the chip has better use for the 9 KB that printing any f32 takes
-                let tenths = libm::roundf(10.0 * mean) as i32;
-                let most = action.property.map_or(0.0, mean_step) * 32768.0;
-                write!(
-                    f,
-                    "texture {}, movement {}: {} {}{}.{} is beyond the table's +-{}",
-                    texture + 1,
-                    action.movement + 1,
-                    action.what(),
-                    if tenths < 0 { "-" } else { "" },
-                    tenths.unsigned_abs() / 10,
-                    tenths.unsigned_abs() % 10,
-                    most as u16
-                )
-            }
-            Self::Invalid(why) => why.fmt(f),
-        }
-    }
+fn range(texture: &u16, action: &Action, mean: &f32, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    // in whole numbers: the chip has better use for the 9 KB that printing any f32 takes
+    let tenths = libm::roundf(10.0 * mean) as i32;
+    let most = action.property.map_or(0.0, mean_step) * 32768.0;
+    write!(
+        f,
+        "texture {}, movement {}: {} {}{}.{} is beyond the table's +-{}",
+        texture + 1,
+        action.movement + 1,
+        action.what(),
+        if tenths < 0 { "-" } else { "" },
+        tenths.unsigned_abs() / 10,
+        tenths.unsigned_abs() % 10,
+        most as u16
+    )
 }
-
-impl core::error::Error for EncodeError {}
 
 /// Bytes that a table without sections takes, names and their lengths included in `names`.
 pub const fn encoded_len(
@@ -146,36 +96,34 @@ pub const fn encoded_len(
     contents.layout(textures, movements).names + names + CRC_BYTES
 }
 
-/// Writes a table of Gaussians into `out` and reads it back.
-///
-/// Means are rounded to [`mean_step`], standard deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4.
-///
-/// # Errors
-/// Parts of `out` may have been written then.
+/// Writes a table of Gaussians into `out` and reads it back: every texture with its name, of 1 to 255 bytes and unlike
+/// every other, and what was learned of it, movement by movement. Means are rounded to [`mean_step`], standard
+/// deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4. Errors: parts of `out` may have been written then.
 pub fn encode<'o, 'a>(
     out: &'o mut [u8],
     measured: PropertySet,
     movements: &[Movement],
-    textures: impl Iterator<Item = Texture<'a>> + Clone,
+    textures: impl Iterator<Item = (&'a str, &'a [Experience])> + Clone,
 ) -> Result<Table<'o>, EncodeError> {
     if measured.is_empty() {
         return Err(EncodeError::Empty);
     }
-    let rows = textures.zip(0..=u16::MAX).map(|(texture, number)| {
-        let slides = texture.experience.iter().map(Experience::trials);
-        let known = Known::Gaussians(texture.experience);
-        Row::new(texture.name, number, known, slides)
+    let rows = textures.zip(0..=u16::MAX).map(|((name, known), number)| {
+        let slides = known.iter().map(Experience::trials);
+        Row::new(name, number, TextureStats::Gaussians(known), slides)
     });
-    let contents = Contents::Gaussians(measured);
-    let movements = movements.iter().copied();
-    write(out, contents, movements, |_| (), 0, rows, (0, |_| ()))
+    let head = Head {
+        contents: Contents::Gaussians(measured),
+        movements: movements.iter().copied(),
+        whitenings: core::iter::empty(),
+        lineage: 0,
+    };
+    write(out, head, rows, |_| Ok(()))
 }
 
 /// Writes a fused table into `out` and reads it back: every movement with its whitening, every texture with its name
 /// and what was learned of it, movement by movement.
-///
-/// # Errors
-/// Parts of `out` may have been written then.
+/// Errors: parts of `out` may have been written then.
 pub fn encode_fused<'o, 'a>(
     out: &'o mut [u8],
     set: FeatureSet,
@@ -186,26 +134,20 @@ pub fn encode_fused<'o, 'a>(
     if !set.allows(features) || movements.iter().any(|(_, w)| w.features() != features) {
         return Err(EncodeError::Contents);
     }
-    let rows = textures
-        .zip(0..=u16::MAX)
-        .map(|((name, whitened), number)| {
-            let slides = whitened.iter().map(|w| w.slides);
-            Row::new(name, number, Known::Fused(whitened), slides)
-        });
-    let whitenings = |writer: &mut Writer<'_>| {
-        for (_, whitening) in movements {
-            writer.put(whitening.as_bytes());
-        }
+    let rows = textures.zip(0..=u16::MAX).map(|((name, known), number)| {
+        let slides = known.iter().map(|w| w.slides);
+        Row::new(name, number, TextureStats::Fused(known), slides)
+    });
+    let head = Head {
+        contents: Contents::Fused(set, features as u8),
+        movements: movements.iter().map(|(movement, _)| *movement),
+        whitenings: movements.iter().map(|(_, whitening)| whitening.as_bytes()),
+        lineage: 0,
     };
-    let contents = Contents::Fused(set, features as u8);
-    let moved = movements.iter().map(|(movement, _)| *movement);
-    write(out, contents, moved, whitenings, 0, rows, (0, |_| ()))
+    write(out, head, rows, |_| Ok(()))
 }
 
 /// Writes `old`, a fused table, into `out` with these sections instead of its own.
-///
-/// # Errors
-/// As [`encode`].
 pub fn with_sections<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
@@ -214,51 +156,57 @@ pub fn with_sections<'o>(
     let Contents::Fused(_, features) = old.contents else {
         return Err(EncodeError::Contents);
     };
-    let features = usize::from(features);
-    let length = sections.length(features);
-    rewrite_with(out, old, 0, length, |put| sections.write(features, put))
+    let write = |writer: &mut Writer<'_>| sections.write(features.into(), writer);
+    rewrite(out, old, 0, Row::all(old), |_| false, write)
 }
 
-/// Writes `old` with other sections, which take so many bytes.
-pub(super) fn rewrite_with<'o>(
+/// Writes `old` with one section in the place of that of the same kind, or without it if it would have no bytes.
+pub(super) fn with_section<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
-    lineage: u32,
-    of_sections: usize,
-    sections: impl FnOnce(&mut dyn FnMut(&[u8])),
+    kind: u16,
+    is_there: bool,
+    contents: impl FnOnce(&mut Writer<'_>),
 ) -> Result<Table<'o>, EncodeError> {
-    let rows = old.names().zip(0..);
-    let rows = rows.map(|(name, texture)| Row::old(old, texture, name));
-    let write = |writer: &mut Writer<'_>| sections(&mut |bytes| writer.put(bytes));
-    rewrite(out, old, lineage, rows, (of_sections, write))
+    let others = |other| other != kind;
+    let write = |writer: &mut Writer<'_>| match is_there {
+        true => writer.section(kind, contents),
+        false => Ok(()),
+    };
+    rewrite(out, old, old.lineage(), Row::all(old), others, write)
 }
 
-/// Writes these rows with all else as `old` has it.
-fn rewrite<'o, 'a>(
+/// Writes these rows with all else as `old` has it: of its sections those to be kept, and more behind them.
+pub(super) fn rewrite<'o, 'a>(
     out: &'o mut [u8],
     old: &Table<'_>,
     lineage: u32,
     rows: impl Iterator<Item = Row<'a>> + Clone,
-    sections: (usize, impl FnOnce(&mut Writer<'_>)),
+    keeps: impl Fn(u16) -> bool,
+    more: impl FnOnce(&mut Writer<'_>) -> Result<(), EncodeError>,
 ) -> Result<Table<'o>, EncodeError> {
     let layout = old.layout();
     let whitenings = old.bytes.get(layout.whitenings..layout.cells);
-    write(
-        out,
-        old.contents,
-        old.movements(),
-        |writer| writer.put(whitenings.unwrap_or_default()),
+    let head = Head {
+        contents: old.contents,
+        movements: old.movements(),
+        whitenings: whitenings.into_iter(),
         lineage,
-        rows,
-        sections,
-    )
+    };
+    write(out, head, rows, |writer| {
+        for (kind, contents) in each(old.sections)
+            .flatten()
+            .filter(|(kind, _)| keeps(*kind))
+        {
+            writer.section(kind, |writer| writer.put(contents))?;
+        }
+        more(writer)
+    })
 }
 
 /// Writes `old` into `out` with one change. All other textures stay the same to the bit; what a table knows of shorter
 /// slides is left out, unless a texture gets another name: every one that is there must be known of them.
-///
-/// # Errors
-/// As [`encode`], and [`EncodeError::Texture`].
+/// Errors: as [`encode`], and [`EncodeError::Texture`].
 #[inline]
 pub fn amend<'o>(
     out: &'o mut [u8],
@@ -284,9 +232,9 @@ pub fn amend<'o>(
         }),
         _ => None,
     };
-    let kept = old.names().zip(0..).filter_map(|(name, texture)| {
-        let row = Row::old(old, texture, name);
-        match change {
+    let kept = Row::all(old)
+        .zip(0..)
+        .filter_map(|(row, texture)| match change {
             Change::Forget(gone) if gone == texture => None,
             Change::Rename { texture: it, name } if it == texture => Some(Row { name, ..row }),
             Change::Put { known, tally, .. } if replaced == Some(texture) => Some(Row {
@@ -295,70 +243,24 @@ pub fn amend<'o>(
                 ..row
             }),
             _ => Some(row),
-        }
-    });
+        });
     let rows = kept.chain(added);
-    if old.is_paced() {
-        return rewrite_paced(out, old, rows);
-    }
-    // what shorter slides say is of these textures and no others
+    // what shorter slides say is of these textures and no others; every row has its slopes, those of all for a new one
     let same = matches!(change, Change::Rename { .. });
-    let left_out = if same { 0 } else { LENGTH };
-    let others = || old.other_sections(left_out);
-    let of_others = others().map(|(head, contents)| head.len() + contents.len());
-    let of_others = of_others.sum();
-    let write = |writer: &mut Writer<'_>| {
-        for (head, contents) in others() {
-            writer.put(&head);
-            writer.put(contents);
-        }
-    };
-    rewrite(out, old, old.lineage(), rows, (of_others, write))
+    let keeps = |kind| kind != SLOPES && (same || kind != LENGTH);
+    let slopes = rows.clone().map(|row| row.slope_of);
+    let more = |writer: &mut Writer<'_>| old.put_slopes(slopes, writer);
+    rewrite(out, old, old.lineage(), rows, keeps, more)
 }
 
-/// As [`rewrite`], of a table that knows speeds: every row with its slopes, those of all textures for a new one.
-fn rewrite_paced<'o, 'a>(
-    out: &'o mut [u8],
-    old: &Table<'_>,
-    rows: impl Iterator<Item = Row<'a>> + Clone,
-) -> Result<Table<'o>, EncodeError> {
-    let (features, movements) = (old.features(), old.movements);
-    let length = slopes::length(features, rows.clone().count(), movements.into());
-    let Ok(length_field) = u16::try_from(length) else {
-        return Err(EncodeError::NoSpace(length));
-    };
-    let others = || old.other_sections(SLOPES);
-    let of_others = others().map(|(head, contents)| head.len() + contents.len());
-    let of_sections = of_others.sum::<usize>() + 4 + length;
-    let of_rows = rows.clone();
-    let write = |writer: &mut Writer<'_>| {
-        for (head, contents) in others() {
-            writer.put(&head);
-            writer.put(contents);
-        }
-        writer.put(&SLOPES.to_le_bytes());
-        writer.put(&length_field.to_le_bytes());
-        writer.put(old.paces_bytes());
-        for row in of_rows {
-            for movement in 0..movements {
-                let slope = old.slope(row.slope_of, movement);
-                put_slope(&slope, features, |bytes| writer.put(bytes));
-            }
-        }
-    };
-    rewrite(out, old, old.lineage(), rows, (of_sections, write))
-}
-
-/// The source of the cells of a texture.
 #[derive(Clone, Copy)]
 enum Cells<'a> {
     Old(Table<'a>, u16),
-    New(Known<'a>),
+    New(TextureStats<'a>),
 }
 
-/// One texture, as it is written.
 #[derive(Clone, Copy)]
-struct Row<'a> {
+pub(super) struct Row<'a> {
     name: &'a str,
     number: u16,
     tally: Tally,
@@ -368,24 +270,29 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// As a table has it.
-    fn old(table: &Table<'a>, texture: u16, name: &'a str) -> Self {
-        Self {
+    pub(super) fn all(table: &Table<'a>) -> impl Iterator<Item = Self> + Clone + use<'a> {
+        let table = *table;
+        table.names().zip(0..).map(move |(name, texture)| Self {
             name,
             number: table.number(texture),
             tally: table.tally(texture),
-            cells: Cells::Old(*table, texture),
+            cells: Cells::Old(table, texture),
             slope_of: Some(texture),
-        }
+        })
     }
 
-    /// Of a table that is made.
-    fn new(name: &'a str, number: u16, known: Known<'a>, slides: impl Iterator<Item = u8>) -> Self {
+    fn new(
+        name: &'a str,
+        number: u16,
+        known: TextureStats<'a>,
+        slides: impl Iterator<Item = u8>,
+    ) -> Self {
+        let factory = slides.fold(0, u8::saturating_add);
         Self {
             name,
             number,
             tally: Tally {
-                factory: slides.fold(0, u8::saturating_add),
+                factory,
                 ..Tally::default()
             },
             cells: Cells::New(known),
@@ -393,45 +300,36 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// Returns whether it has statistics at every movement.
-    fn fits(&self, contents: Contents, movements: usize) -> Result<bool, EncodeError> {
-        match (self.cells, contents) {
-            (Cells::Old(..), _) => Ok(true),
-            (Cells::New(Known::Gaussians(known)), Contents::Gaussians(_)) => {
-                Ok(known.len() == movements)
-            }
-            (Cells::New(Known::Fused(known)), Contents::Fused(..)) => Ok(known.len() == movements),
-            _ => Err(EncodeError::Contents),
-        }
-    }
-
     fn put_cells(
         &self,
         writer: &mut Writer<'_>,
         contents: Contents,
+        movements: usize,
         index: u16,
     ) -> Result<(), EncodeError> {
+        let whole = |known: usize| match known == movements {
+            true => Ok(()),
+            false => Err(EncodeError::Movements(index)),
+        };
         match (self.cells, contents) {
             (Cells::Old(table, texture), _) => {
                 for movement in 0..table.movements {
                     writer.put(table.cell_bytes(texture, movement).unwrap_or_default());
                 }
-                Ok(())
             }
-            (Cells::New(Known::Gaussians(known)), Contents::Gaussians(measured)) => {
-                put_gaussians(writer, measured, known, index)
+            (Cells::New(TextureStats::Gaussians(known)), Contents::Gaussians(measured)) => {
+                whole(known.len())?;
+                put_gaussians(writer, measured, known, index)?;
             }
-            (Cells::New(Known::Fused(known)), Contents::Fused(_, features)) => {
-                for mean in known
-                    .iter()
-                    .flat_map(|k| k.mean.iter().take(features.into()))
-                {
-                    writer.put(&mean.to_le_bytes());
+            (Cells::New(TextureStats::Fused(known)), Contents::Fused(_, features)) => {
+                whole(known.len())?;
+                for known in known {
+                    writer.put_numbers(known.mean.iter().take(features.into()));
                 }
-                Ok(())
             }
-            _ => Err(EncodeError::Contents),
+            _ => return Err(EncodeError::Contents),
         }
+        Ok(())
     }
 
     fn put_trials(&self, writer: &mut Writer<'_>) {
@@ -439,10 +337,12 @@ impl<'a> Row<'a> {
             Cells::Old(table, texture) => {
                 (0..table.movements).for_each(|m| writer.put(&[table.trials(texture, m)]));
             }
-            Cells::New(Known::Gaussians(known)) => {
+            Cells::New(TextureStats::Gaussians(known)) => {
                 known.iter().for_each(|k| writer.put(&[k.trials]));
             }
-            Cells::New(Known::Fused(known)) => known.iter().for_each(|k| writer.put(&[k.slides])),
+            Cells::New(TextureStats::Fused(known)) => {
+                known.iter().for_each(|k| writer.put(&[k.slides]));
+            }
         }
     }
 }
@@ -480,53 +380,46 @@ fn put_gaussians(
     Ok(())
 }
 
-/// Writes all parts, and reads the table back.
-fn write<'o, 'a>(
-    out: &'o mut [u8],
+struct Head<M, W> {
     contents: Contents,
-    movements: impl ExactSizeIterator<Item = Movement>,
-    whitenings: impl FnOnce(&mut Writer<'_>),
+    movements: M,
+    whitenings: W,
     lineage: u32,
+}
+
+fn write<'o, 'a, 'w>(
+    out: &'o mut [u8],
+    head: Head<impl ExactSizeIterator<Item = Movement>, impl Iterator<Item = &'w [u8]>>,
     rows: impl Iterator<Item = Row<'a>> + Clone,
-    (of_sections, sections): (usize, impl FnOnce(&mut Writer<'_>)),
+    sections: impl FnOnce(&mut Writer<'_>) -> Result<(), EncodeError>,
 ) -> Result<Table<'o>, EncodeError> {
-    let (count, names) = rows.clone().fold((0usize, 0), |(n, names), row| {
-        (n + 1, names + 1 + row.name.len())
-    });
-    let length = encoded_len(contents, count, movements.len(), names) + of_sections;
-    let (Ok(count), Ok(length_field)) = (u16::try_from(count), u32::try_from(length)) else {
-        return Err(EncodeError::NoSpace(length));
-    };
-    if count == 0 || !(1..=MAX_MOVEMENTS).contains(&movements.len()) {
+    let (count, movements) = (rows.clone().count(), head.movements.len());
+    if count == 0 || !(1..=MAX_MOVEMENTS).contains(&movements) {
         return Err(EncodeError::Empty);
     }
-    let per_texture = movements.len();
-    let mut writer = Writer {
-        buffer: out.get_mut(..length).ok_or(EncodeError::NoSpace(length))?,
-        at: 0,
+    let Ok(count_field) = u16::try_from(count) else {
+        let least = encoded_len(head.contents, count, movements, 0);
+        return Err(EncodeError::NoSpace(least));
     };
-    let [code, what, features] = contents.codes();
+    let mut writer = Writer { buffer: out, at: 0 };
+    let [code, what, features] = head.contents.codes();
     writer.put(&MAGIC);
     writer.put(&VERSION.to_le_bytes());
     writer.put(&[code, what]);
-    writer.put(&length_field.to_le_bytes());
-    writer.put(&count.to_le_bytes());
-    writer.put(&[per_texture as u8, features]);
-    for movement in movements {
+    let length_at = writer.at;
+    writer.put(&[0; 4]);
+    writer.put(&count_field.to_le_bytes());
+    writer.put(&[movements as u8, features]);
+    for movement in head.movements {
         writer.put(&movement.force_mn().to_le_bytes());
         writer.put(&movement.speed_um_s().to_le_bytes());
     }
-    whitenings(&mut writer);
+    head.whitenings.for_each(|bytes| writer.put(bytes));
     for (row, index) in rows.clone().zip(0..) {
-        if !row.fits(contents, per_texture)? {
-            return Err(EncodeError::Movements(index));
-        }
-        row.put_cells(&mut writer, contents, index)?;
+        row.put_cells(&mut writer, head.contents, movements, index)?;
     }
-    for row in rows.clone() {
-        row.put_trials(&mut writer);
-    }
-    writer.put(&lineage.to_le_bytes());
+    rows.clone().for_each(|row| row.put_trials(&mut writer));
+    writer.put(&head.lineage.to_le_bytes());
     for row in rows.clone() {
         let Tally {
             factory,
@@ -540,30 +433,61 @@ fn write<'o, 'a>(
         writer.put(&[u8::try_from(row.name.len()).map_err(|_| EncodeError::Name(index))?]);
         writer.put(row.name.as_bytes());
     }
-    sections(&mut writer);
-    let crc = CRC32.checksum(writer.written());
-    writer.put(&crc.to_le_bytes());
-    Table::read(writer.buffer).map_err(EncodeError::Invalid)
+    sections(&mut writer)?;
+    let length = writer.at + CRC_BYTES;
+    let length_field = u32::try_from(length).map_err(|_| EncodeError::NoSpace(length))?;
+    writer.put_at(length_at, &length_field.to_le_bytes());
+    if length > writer.buffer.len() {
+        return Err(EncodeError::NoSpace(length));
+    }
+    let written = writer.buffer.get(..writer.at).unwrap_or_default();
+    writer.put(&CRC32.checksum(written).to_le_bytes());
+    let (table, _) = out.split_at_checked(length).unwrap_or_default();
+    Table::read(table).map_err(EncodeError::Invalid)
 }
 
-/// Fills a slice from its beginning.
-struct Writer<'o> {
+/// Fills a slice from its beginning, and counts what it has no space for.
+pub(super) struct Writer<'o> {
     buffer: &'o mut [u8],
     at: usize,
 }
 
 impl Writer<'_> {
-    fn put(&mut self, bytes: &[u8]) {
-        if let Some(buffer) = self.buffer.get_mut(self.at..self.at + bytes.len()) {
+    pub(super) fn put(&mut self, bytes: &[u8]) {
+        self.put_at(self.at, bytes);
+        self.at += bytes.len();
+    }
+
+    fn put_at(&mut self, at: usize, bytes: &[u8]) {
+        if let Some(buffer) = self.buffer.get_mut(at..at + bytes.len()) {
             // as long as these; `copy_from_slice` would ask again
             for (to, from) in buffer.iter_mut().zip(bytes) {
                 *to = *from;
             }
         }
-        self.at += bytes.len();
     }
 
-    fn written(&self) -> &[u8] {
-        self.buffer.get(..self.at).unwrap_or_default()
+    pub(super) fn put_numbers<'n>(&mut self, numbers: impl Iterator<Item = &'n i16>) {
+        numbers.for_each(|number| self.put(&number.to_le_bytes()));
+    }
+
+    pub(super) fn put_floats(&mut self, floats: impl Iterator<Item = f32>) {
+        floats.for_each(|float| self.put(&float.to_le_bytes()));
+    }
+
+    /// A section: kind, length, and what `contents` puts.
+    pub(super) fn section(
+        &mut self,
+        kind: u16,
+        contents: impl FnOnce(&mut Self),
+    ) -> Result<(), EncodeError> {
+        let at = self.at;
+        self.put(&kind.to_le_bytes());
+        self.put(&[0; 2]);
+        contents(self);
+        let length = self.at - at - HEAD;
+        let length = u16::try_from(length).map_err(|_| EncodeError::NoSpace(length))?;
+        self.put_at(at + 2, &length.to_le_bytes());
+        Ok(())
     }
 }

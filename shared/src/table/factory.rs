@@ -1,6 +1,6 @@
-//! The tables that come with the firmware: textures of a simulated world, learned there by `cargo xtask campaign factory`. A
-//! probe is trained by its user, or receives a table from the host. A table that is not named takes no space in an
-//! image.
+//! The tables that come with the firmware: textures of a simulated world, learned there by
+//! `cargo xtask campaign factory`. A probe is trained by its user, or receives a table from the host. A table that is
+//! not named takes no space in an image.
 use crate::sensor::FingerName;
 
 macro_rules! tables {
@@ -38,8 +38,9 @@ pub const fn rig(finger: FingerName) -> &'static [u8] {
     }
 }
 
-/// The table of a finger on somebody else's arm. Only a BioTac has one of its own; the rig's of the others names the finger and the
-/// movements, and knows the shear, which an arm's slides do not have: such a probe is trained, or receives a table.
+/// The table of a finger on somebody else's arm. Only a BioTac has one of its own; the rig's of the others names the
+/// finger and the movements, and knows the shear, which an arm's slides do not have: such a probe is trained, or
+/// receives a table.
 pub const fn arm(finger: FingerName) -> &'static [u8] {
     match finger {
         FingerName::Biotac => ARM,

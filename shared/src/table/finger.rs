@@ -1,15 +1,7 @@
 //! The finger that a table was learned with: bands and pressures of two kinds of fingers cannot be compared.
-//!
-//! Section of kind 5; a table without it was learned with a BioTac.
-//!
-//! | bytes | what |
-//! |---|---|
-//! | 1 | the finger: 0 `biotac`, 1 `analog`, 2 `mems` |
-//! | 4 | day on which its force per count was measured, as 20261121; 1 where nobody knew the day, 0 if it was not, or is not known |
 
-use super::encode::EncodeError;
+use super::encode::{EncodeError, with_section};
 use super::format::{TableError, array};
-use super::one_section::rewrite_section;
 use super::sections::FINGER;
 use super::view::Table;
 use crate::sensor::FingerCode;
@@ -34,9 +26,6 @@ impl Table<'_> {
     }
 
     /// This table, if it was learned with this finger.
-    ///
-    /// # Errors
-    /// [`TableError::Finger`].
     pub fn of_finger(self, probe: FingerCode) -> Result<Self, TableError> {
         let table = self.finger();
         if table == probe {
@@ -48,19 +37,15 @@ impl Table<'_> {
 }
 
 /// Writes `old` into `out`, with this finger and the day of its calibration in place of what it says of that.
-///
-/// # Errors
-/// As [`super::encode`].
 pub fn with_finger<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
     finger: FingerCode,
     calibrated: u32,
 ) -> Result<Table<'o>, EncodeError> {
-    let silent = finger == FingerCode::BIOTAC && calibrated == 0;
-    let length = if silent { 0 } else { 5 };
-    rewrite_section(out, old, FINGER, length, |put| {
-        put(&[finger.0]);
-        put(&calibrated.to_le_bytes());
+    let is_there = finger != FingerCode::BIOTAC || calibrated != 0;
+    with_section(out, old, FINGER, is_there, |writer| {
+        writer.put(&[finger.0]);
+        writer.put(&calibrated.to_le_bytes());
     })
 }

@@ -12,16 +12,11 @@ use crate::sensor::FingerCode;
 pub(super) const MAGIC: [u8; 4] = *b"TACT";
 /// Version of the binary form.
 pub const VERSION: u16 = 1;
-/// The kind of the section that has them.
 pub(super) const SLOPES: u16 = 4;
-/// Bytes of a section's kind and length.
 pub(super) const HEAD: usize = 4;
-/// The kind of the section of drift, and bytes of its two numbers.
 pub(super) const DRIFT: u16 = 1;
 pub(super) const TWO: usize = 8;
-/// Bytes of a length of shorter slides in its section.
 pub(super) const MS: usize = 2;
-/// The kind of the sections that say it, one for each length.
 pub(super) const LENGTH: u16 = 6;
 pub(super) const GAUSSIANS: u8 = 0;
 pub(super) const FUSED: u8 = 1;
@@ -90,140 +85,69 @@ pub struct Tally {
 }
 
 /// The reasons why bytes are not a valid texture table.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum TableError {
-    /// Fewer bytes than the table needs.
-    Truncated {
-        /// Bytes there are.
-        got: usize,
-        /// Bytes that are needed.
-        wanted: usize,
-    },
-    /// It does not begin with `TACT`.
+    #[error("truncated: {got} bytes of {wanted}")]
+    Truncated { got: usize, wanted: usize },
+    #[error("not a texture table: it begins with {0:02x?}, not `TACT`")]
     Magic([u8; 4]),
-    /// Written by another version.
+    #[error(
+        "version {0}, and this program reads version {VERSION}: learn the table anew, or use the program that wrote it"
+    )]
     Version(u16),
-    /// A way of deciding that this version does not know.
+    #[error("method {0} is unknown to this program")]
     Method(u8),
-    /// The length in the header does not fit what it holds.
-    Length {
-        /// The length in the header.
-        header: usize,
-        /// The length of the contents.
-        contents: usize,
-    },
-    /// The checksum differs: the bytes have changed since they were written.
-    Crc {
-        /// Stored checksum.
-        stored: u32,
-        /// Checksum of the bytes.
-        computed: u32,
-    },
-    /// No texture, no movement or no property, too many movements or features, or a reserved byte that is not 0.
+    #[error("the header says {header} bytes, the contents take {contents}")]
+    Length { header: usize, contents: usize },
+    #[error("damaged: checksum {computed:08x}, and {stored:08x} was written")]
+    Crc { stored: u32, computed: u32 },
+    #[error("the header counts no textures, movements or properties, or too many")]
     Header,
-    /// A movement that no rig makes.
+    #[error("movement {}: {}", .0 + 1, .1)]
     Movement(u8, MovementError),
-    /// The same movement twice.
+    #[error("movement {} is there twice", .0 + 1)]
     TwinMovement(u8),
-    /// A standard deviation of 0 where there are trials to have one.
-    Deviation {
-        /// Index of the texture.
-        texture: u16,
-        /// The action concerned.
-        action: Action,
-    },
-    /// A whitening that cannot be one.
+    #[error(
+        "texture {}, movement {}, {}: trials, but no standard deviation",
+        .texture + 1,
+        .action.movement + 1,
+        .action.what()
+    )]
+    Deviation { texture: u16, action: Action },
+    #[error("the whitening of movement {} is damaged", .0 + 1)]
     Whitening(u8),
-    /// A name that is empty, not UTF-8, or another texture's as well.
+    #[error("the name of texture {} is empty, not UTF-8, or another's as well", .0 + 1)]
     Name(u16),
-    /// A texture has the number of another one.
+    #[error("texture {} has another's number", .0 + 1)]
     Number(u16),
-    /// The bytes after the names are not valid sections.
+    #[error("what follows the names is damaged")]
     Sections,
     /// A section of this kind is damaged, there twice, or not for such a table.
+    #[error(fmt = damaged)]
     Section(u16),
-    /// It was learned with another finger than the probe has.
+    #[error(
+        "learned with the finger {table}, but the finger here is {probe}: their slides cannot be compared. Use a table \
+         that was learned with {probe}"
+    )]
     Finger {
-        /// The table's.
         table: FingerCode,
-        /// The probe's.
         probe: FingerCode,
     },
 }
 
-impl fmt::Display for TableError {
-    #[inline]
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Truncated { got, wanted } => write!(f, "truncated: {got} bytes of {wanted}"),
-            // by hand: printing lists for debugging takes the chip 1 KB
-            Self::Magic([a, b, c, d]) => write!(
-                f,
-                "not a texture table: it begins with [{a:02x}, {b:02x}, {c:02x}, {d:02x}], not `TACT`"
-            ),
-            Self::Version(found) => write!(
-                f,
-                "version {found}, and this program reads version {VERSION}: learn the table anew, or use the program \
-                 that wrote it"
-            ),
-            Self::Method(found) => write!(f, "method {found} is unknown to this program"),
-            Self::Length { header, contents } => {
-                write!(
-                    f,
-                    "the header says {header} bytes, the contents take {contents}"
-                )
-            }
-            Self::Crc { stored, computed } => {
-                write!(
-                    f,
-                    "damaged: checksum {computed:08x}, and {stored:08x} was written"
-                )
-            }
-            Self::Header => {
-                f.write_str("the header counts no textures, movements or properties, or too many")
-            }
-            Self::Movement(index, why) => write!(f, "movement {}: {why}", index + 1),
-            Self::TwinMovement(index) => write!(f, "movement {} is there twice", index + 1),
-            Self::Deviation { texture, action } => write!(
-                f,
-                "texture {}, movement {}, {}: trials, but no standard deviation",
-                texture + 1,
-                action.movement + 1,
-                action.what()
-            ),
-            Self::Whitening(index) => {
-                write!(f, "the whitening of movement {} is damaged", index + 1)
-            }
-            Self::Sections => f.write_str("what follows the names is damaged"),
-            Self::Finger { table, probe } => write!(
-                f,
-                "learned with the finger {table}, but the finger here is {probe}: their slides cannot be compared. Use a table that was learned with {probe}"
-            ),
-            Self::Section(1) => f.write_str("the drift that it expects is damaged"),
-            Self::Section(2) => f.write_str("its limits of new and changed textures are damaged"),
-            Self::Section(4) => f.write_str("its slopes over speed are damaged"),
-            Self::Section(6) => f.write_str("what it says of shorter slides is damaged"),
-            Self::Section(kind) => write!(f, "section {kind} is damaged"),
-            Self::Number(texture) => {
-                write!(f, "texture {} has another's number", texture + 1)
-            }
-            Self::Name(texture) => {
-                write!(
-                    f,
-                    "the name of texture {} is empty, not UTF-8, or another's as well",
-                    texture + 1
-                )
-            }
-        }
-    }
+fn damaged(kind: &u16, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    f.write_str(match *kind {
+        DRIFT => "the drift that it expects is damaged",
+        2 => "its limits of new and changed textures are damaged",
+        SLOPES => "its slopes over speed are damaged",
+        LENGTH => "what it says of shorter slides is damaged",
+        kind => return write!(f, "section {kind} is damaged"),
+    })
 }
 
-impl core::error::Error for TableError {}
-
-/// Bytes of a texture's number and tally.
 pub(super) const LABEL_BYTES: usize = 5;
 
-/// The offsets of the parts of a table.
 pub(super) struct Layout {
     pub(super) whitenings: usize,
     pub(super) cells: usize,
@@ -261,7 +185,6 @@ impl Contents {
         }
     }
 
-    /// The three bytes of the header that say so.
     pub(super) const fn codes(self) -> [u8; 3] {
         match self {
             Self::Gaussians(measured) => [GAUSSIANS, measured.bits(), 0],

@@ -34,7 +34,6 @@ pub struct Gaussians<'t> {
     /// Each `movements` after the one before.
     pub(super) trials: &'t [u8],
     pub(super) movements: usize,
-    /// Of the means.
     pub(super) step: f32,
 }
 
@@ -52,7 +51,7 @@ impl<'t> Gaussians<'t> {
     }
 
     /// Mean (as i16) and standard deviation of each texture, in steps.
-    pub fn cells(&self) -> impl Iterator<Item = [u16; 2]> + use<'t> {
+    pub(crate) fn cells(&self) -> impl Iterator<Item = [u16; 2]> + use<'t> {
         let cells = self.cells.chunks(self.stride.max(1));
         cells.map_while(|cell| {
             let &[m0, m1, s0, s1] = cell.first_chunk()?;

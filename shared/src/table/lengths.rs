@@ -4,16 +4,8 @@
 //! compared with the first parts of the slides that were learned from. In a table of M movements those of the n-th
 //! length of movement m are the movement n M + m of whoever asks for cells, trials, drift or population; the whole
 //! slides are length 0.
-//!
-//! Section of kind 6, one for each length, the shortest first:
-//!
-//! | bytes | what |
-//! |---|---|
-//! | 2 | the length in ms at constant speed |
-//! | | header, movements, whitenings, cells and trials, as the table has them for whole slides |
-//! | | contents of section 1, and of section 2, where the table has them |
 
-use super::encode::{EncodeError, rewrite_with};
+use super::encode::{EncodeError, Row, Writer, rewrite};
 use super::format::{CRC_BYTES, DRIFT, HEAD, HEADER, LENGTH, MAX_MOVEMENTS, MS, TWO, array, each};
 use super::limits::Limits;
 use super::sections::{NOVELTY, are_drifts, are_limits, of_drift, of_population};
@@ -42,39 +34,24 @@ impl Shorter<'_> {
         movement < u64::BITS as usize && self.movements >> movement & 1 == 1
     }
 
-    /// Bytes of the contents of its section.
-    fn length(&self) -> usize {
-        let table = &self.table;
-        let of = |kind| table.section(kind).map_or(0, <[u8]>::len);
-        MS + table.layout().lineage + of(DRIFT) + of(NOVELTY)
-    }
-
-    fn write(&self, put: &mut dyn FnMut(&[u8])) {
+    fn write(&self, writer: &mut Writer<'_>) {
         let (table, layout) = (&self.table, self.table.layout());
-        put(&self.ms.to_le_bytes());
-        put(table.bytes.get(..layout.trials).unwrap_or_default());
-        for trials in table.bytes.get(layout.trials..layout.lineage).into_iter() {
-            for (&trials, at) in trials.iter().zip(0_usize..) {
-                let longer = self.is_longer(at % usize::from(table.movements).max(1));
-                put(&[if longer { trials } else { 0 }]);
-            }
+        writer.put(&self.ms.to_le_bytes());
+        writer.put(table.bytes.get(..layout.trials).unwrap_or_default());
+        let trials = table.bytes.get(layout.trials..layout.lineage);
+        for (&trials, at) in trials.unwrap_or_default().iter().zip(0_usize..) {
+            let longer = self.is_longer(at % usize::from(table.movements).max(1));
+            writer.put(&[if longer { trials } else { 0 }]);
         }
         for kind in [DRIFT, NOVELTY] {
-            put(table.section(kind).unwrap_or_default());
+            writer.put(table.section(kind).unwrap_or_default());
         }
     }
-}
-
-/// Bytes that the sections of these lengths take.
-pub fn lengths_length(shorter: &[Shorter<'_>]) -> usize {
-    shorter.iter().map(|s| HEAD + s.length()).sum()
 }
 
 /// Writes `old` into `out` with these lengths, the shortest first, in place of those it has.
-///
-/// # Errors
-/// As [`super::encode`]; [`EncodeError::Contents`] for a table that is not of the same textures and movements, and
-/// [`EncodeError::NoSpace`] for one of more bytes than a section can have.
+/// Errors: as [`super::encode`]; [`EncodeError::Contents`] for a table that is not of the same textures and movements,
+/// and [`EncodeError::NoSpace`] for one of more bytes than a section can have.
 pub fn with_lengths<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
@@ -88,26 +65,13 @@ pub fn with_lengths<'o>(
         if !same {
             return Err(EncodeError::Contents);
         }
-        let length = s.length();
-        u16::try_from(length).map_err(|_| EncodeError::NoSpace(length))?;
     }
-    let others = || old.other_sections(LENGTH);
-    let of_others: usize = others()
-        .map(|(head, contents)| head.len() + contents.len())
-        .sum();
-    let length = of_others + lengths_length(shorter);
     // it is part of making the table, not learned later
     let lineage = array(old.bytes, old.layout().lineage).map_or(0, u32::from_le_bytes);
-    rewrite_with(out, old, lineage, length, |put| {
-        for (head, contents) in others() {
-            put(&head);
-            put(contents);
-        }
-        for s in shorter {
-            put(&LENGTH.to_le_bytes());
-            put(&(s.length() as u16).to_le_bytes());
-            s.write(put);
-        }
+    let others = |kind| kind != LENGTH;
+    rewrite(out, old, lineage, Row::all(old), others, |writer| {
+        let mut each = shorter.iter();
+        each.try_for_each(|s| writer.section(LENGTH, |writer| s.write(writer)))
     })
 }
 
@@ -121,7 +85,7 @@ impl<'a> Table<'a> {
     /// length.
     pub(crate) fn at_length(&self, movement: u8, n: u8) -> Option<u8> {
         let at = n.checked_mul(self.movements)?.checked_add(movement)?;
-        let known = movement < self.movements && self.shorter(at).is_some();
+        let known = n > 0 && movement < self.movements && self.at(at).is_some();
         known.then_some(at)
     }
 
@@ -132,8 +96,8 @@ impl<'a> Table<'a> {
 
     /// As [`Table::limits`], of slides of the length that a movement stands for.
     pub(crate) fn limits_at(&self, movement: u8) -> Option<Limits> {
-        match self.shorter(movement) {
-            Some((shorter, _)) => shorter.limits(),
+        match self.at(movement) {
+            Some((table, _)) => table.limits(),
             None => self.limits(),
         }
     }

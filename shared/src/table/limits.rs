@@ -50,7 +50,6 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Bytes that they take in a table.
     pub(super) const BYTES: usize = 4 + 2 * EPISODES * 8;
 
     /// The limit after so many slides, for this share of real false alarms, or the table's own.
@@ -71,10 +70,9 @@ impl Limits {
         self.drifted.into_iter().chain(self.same)
     }
 
-    pub(super) fn bytes(&self) -> impl Iterator<Item = [u8; 4]> {
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f32> {
         let tails = self.tails().flat_map(|tail| [tail.begin, tail.excess]);
-        let numbers = core::iter::once(self.false_alarm).chain(tails);
-        numbers.map(f32::to_le_bytes)
+        core::iter::once(self.false_alarm).chain(tails)
     }
 
     /// Returns whether these are possible limits: finite, as scores are, for an allowed share.

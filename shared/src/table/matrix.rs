@@ -2,7 +2,6 @@
 
 use crate::features::MAX_FEATURES;
 
-/// Rounds of rotations for the eigenvectors of a matrix.
 const SWEEPS: usize = 12;
 /// Least part of a feature's variance that the features before it may leave unexplained.
 const LEAST_PIVOT: f64 = 1e-6;

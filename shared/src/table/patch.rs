@@ -14,9 +14,7 @@ use crate::features::Property;
 
 /// Puts what a fused table has learned on the go of a texture at a movement in its place, and marks the table as made
 /// from the one that it was.
-///
-/// # Errors
-/// The bytes are no fused table, or have no such texture or movement.
+/// Errors: the bytes are no fused table, or have no such texture or movement.
 #[inline]
 pub fn retell(
     bytes: &mut [u8],
@@ -85,9 +83,7 @@ impl Table<'_> {
 /// Puts other features in the place of those that are whitened to 0 at a movement: what was learned keeps its place
 /// among the whitened, and slides that differ from those of before by as much are whitened as those were. Of shorter
 /// slides nothing is known of that movement then.
-///
-/// # Errors
-/// The bytes are no fused table of so many features, or have no such movement.
+/// Errors: the bytes are no fused table of so many features, or have no such movement.
 pub fn recentre(bytes: &mut [u8], movement: u8, centre: &[i16]) -> Result<(), EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let Contents::Fused(_, features) = table.contents else {

@@ -2,27 +2,15 @@
 //!
 //! A slide on the same track again says little about a texture. Nothing is decided by this: a probe carries the section
 //! over as it is when it learns or deletes textures, and does not look into it.
-//!
-//! Section of kind 3, 5 bytes for each texture of which it is known:
-//!
-//! | bytes | what |
-//! |---|---|
-//! | 2 | the texture's number |
-//! | 2 | the lower half of its name's CRC-32: a texture that got the number of a deleted one has another |
-//! | 1 | 1: always at the same spot; 2: moved or turned between trials |
 
-use super::encode::EncodeError;
+use super::encode::{EncodeError, with_section};
 use super::format::TableError;
-use super::one_section::rewrite_section;
 use super::sections::SAMPLES;
 use super::view::Table;
 use crate::CRC32;
 
-/// Bytes of a texture in the section.
 const ENTRY: usize = 5;
-/// Always at the same spot.
 const STAYED: u8 = 1;
-/// Moved or turned between trials.
 const MOVED: u8 = 2;
 
 /// The bytes that distinguish a texture's name from another.
@@ -45,9 +33,6 @@ impl Table<'_> {
     }
 
     /// That what it says of samples is whole: [`Table::read`] does not look.
-    ///
-    /// # Errors
-    /// [`TableError::Section`].
     pub fn check_samples(&self) -> Result<(), TableError> {
         let Some(section) = self.section(SAMPLES) else {
             return Ok(());
@@ -65,16 +50,8 @@ impl Table<'_> {
     }
 }
 
-/// Most bytes that it takes to say of so many textures whether their samples were moved.
-pub const fn samples_length(textures: usize) -> usize {
-    4 + ENTRY * textures
-}
-
 /// Writes `old` into `out`, with whether the sample of each texture was moved in place of what it says of that; all
 /// else stays as it is, and so does the table where nothing is known of any.
-///
-/// # Errors
-/// As [`super::encode`].
 pub fn with_moved<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
@@ -87,11 +64,8 @@ pub fn with_moved<'o>(
             Some([k0, k1, k2, k3, said])
         })
     };
-    let known = entries().count();
-    let length = u16::try_from(known * ENTRY).unwrap_or(u16::MAX);
-    // as many as fit: no table has so many textures
-    let known = usize::from(length) / ENTRY;
-    rewrite_section(out, old, SAMPLES, (known * ENTRY) as u16, |put| {
-        entries().take(known).for_each(|entry| put(&entry));
+    let is_there = entries().next().is_some();
+    with_section(out, old, SAMPLES, is_there, |writer| {
+        entries().for_each(|entry| writer.put(&entry));
     })
 }

@@ -19,14 +19,12 @@ const ROUNDING: f64 = 1.0 / 12.0;
 
 /// The reasons why a whitening cannot be learned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum WhitenError {
-    /// No texture has two slides of this movement.
     #[error("movement {}: no texture has two slides, and how slides of one texture differ takes two", .0 + 1)]
     Trials(u8),
-    /// Slides have different numbers of features, or none.
     #[error("the slides do not have the same features")]
     Features,
-    /// No movement, or more than a table holds.
     #[error("a table has 1 to {MAX_MOVEMENTS} movements")]
     Movements,
 }
@@ -63,9 +61,6 @@ impl Scatter {
     }
 
     /// Takes in all slides of one texture at this movement.
-    ///
-    /// # Errors
-    /// [`WhitenError::Features`].
     pub fn push(&mut self, slides: &[Vector]) -> Result<(), WhitenError> {
         if slides.iter().any(|slide| slide.len() != self.features) {
             return Err(WhitenError::Features);
@@ -126,23 +121,8 @@ impl Scatter {
 }
 
 /// The whitening of every movement, from how slides scatter there: pooled covariance, blended with the average over all
-/// movements, its correlations shrunk towards none (OAS), and turned so that means of textures are uncorrelated.
-///
-/// # Errors
-/// See [`WhitenError`].
-pub fn whiten(scatters: &[Scatter]) -> Result<Vec<Whitening, MAX_MOVEMENTS>, WhitenError> {
-    let learned = whiten_drifting(scatters, FeatureSet::Bands, Drift::NONE)?;
-    Ok(learned
-        .into_iter()
-        .map(|(whitening, _)| whitening)
-        .collect())
-}
-
-/// As [`whiten`], for features of which is known how they drift: turned into the axes along which the drift has no
-/// covariances, and its variances along these.
-///
-/// # Errors
-/// See [`WhitenError`].
+/// movements, its correlations shrunk towards none (OAS), and turned so that means of textures are uncorrelated; for
+/// features that drift, into the axes along which the drift has no covariances, and its variances along these.
 pub fn whiten_drifting(
     scatters: &[Scatter],
     set: FeatureSet,

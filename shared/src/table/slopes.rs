@@ -2,19 +2,15 @@
 //!
 //! A rig holds its speed, a hand does not. Where the speed was measured while a table was learned, its means are those
 //! at the movement's speed, and slides scatter about the line; so a slide of unknown speed lies somewhere on it.
-//!
-//! Section of kind 4, per movement: the speed that is expected where none was measured, [`Pace::mean`] (i16) and
-//! [`Pace::variance`] (f32), the slope of all textures together (d numbers, i16); then per texture and movement its
-//! slope (d numbers, i16).
 
-use super::format::array;
+use super::encode::{EncodeError, Writer};
+use super::format::{SLOPES, array};
 use super::view::Table;
 use super::whitening::{Column, Slope};
 use crate::features::{FEATURE_STEPS, Observation, Vector};
 
 /// Largest variance of ln(speed) that a table may expect.
 const MOST_VARIANCE: f32 = 4.0;
-/// Bytes of mean and variance.
 const EXPECTED: usize = 6;
 
 /// The speeds of a movement, as ln of them in parts of the movement's.
@@ -37,17 +33,14 @@ pub struct Slopes<'a> {
     pub slopes: &'a [Slope],
 }
 
-/// The slopes of all textures at a movement, where their table lies.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlopesView<'t> {
-    /// As [`Pace::mean`] and [`Pace::variance`].
     pub(crate) mean: i16,
     pub(crate) variance: f32,
     /// Slopes in the place of means.
     pub(crate) column: Column<'t>,
 }
 
-/// Bytes of a movement's speeds, and of all of them and all slopes.
 const fn of_pace(features: usize) -> usize {
     EXPECTED + 2 * features
 }
@@ -57,26 +50,18 @@ pub(super) const fn length(features: usize, textures: usize, movements: usize) -
 }
 
 impl Slopes<'_> {
-    /// Gives the bytes, piece by piece, of so many features.
-    pub(super) fn write(&self, features: usize, mut put: impl FnMut(&[u8])) {
+    pub(super) fn write(&self, features: usize, writer: &mut Writer<'_>) {
         for pace in self.paces {
-            put(&pace.mean.to_le_bytes());
-            put(&pace.variance.to_le_bytes());
-            put_slope(&pace.pooled, features, &mut put);
+            writer.put(&pace.mean.to_le_bytes());
+            writer.put(&pace.variance.to_le_bytes());
+            writer.put_numbers(pace.pooled.iter().take(features));
         }
         for slope in self.slopes {
-            put_slope(slope, features, &mut put);
+            writer.put_numbers(slope.iter().take(features));
         }
     }
 }
 
-pub(super) fn put_slope(slope: &Slope, features: usize, mut put: impl FnMut(&[u8])) {
-    for number in slope.iter().take(features) {
-        put(&number.to_le_bytes());
-    }
-}
-
-/// Returns whether these are valid contents of a section of kind 4.
 pub(super) fn are_slopes(bytes: &[u8], features: usize, textures: usize, movements: usize) -> bool {
     let possible = |movement: usize| {
         let at = movement * of_pace(features) + 2;
@@ -92,10 +77,24 @@ impl<'a> Table<'a> {
         !self.slopes.is_empty()
     }
 
-    /// The part of the section that all textures share.
-    pub(super) fn paces_bytes(&self) -> &'a [u8] {
-        let length = usize::from(self.movements) * of_pace(self.features());
-        self.slopes.get(..length).unwrap_or_default()
+    /// Puts the section with the slopes of these textures, those of all for `None`; nothing if it knows no speeds.
+    pub(super) fn put_slopes(
+        &self,
+        textures: impl Iterator<Item = Option<u16>>,
+        writer: &mut Writer<'_>,
+    ) -> Result<(), EncodeError> {
+        if !self.is_paced() {
+            return Ok(());
+        }
+        let paces = usize::from(self.movements) * of_pace(self.features());
+        writer.section(SLOPES, |writer| {
+            writer.put(self.slopes.get(..paces).unwrap_or_default());
+            for texture in textures {
+                for movement in 0..self.movements {
+                    writer.put(self.slope_bytes(texture, movement));
+                }
+            }
+        })
     }
 
     /// The slope of a texture at a movement; that of all where there is no such texture.
@@ -112,7 +111,6 @@ impl<'a> Table<'a> {
         bytes.get(..2 * features).unwrap_or_default()
     }
 
-    /// As [`Table::slope`], numbers one by one.
     fn numbers(&self, texture: Option<u16>, movement: u8) -> impl Iterator<Item = i16> + use<'a> {
         let bytes = self.slope_bytes(texture, movement);
         bytes

@@ -43,10 +43,8 @@ pub(crate) fn table_of(measured: PropertySet, trials: &[Vec<Vec<[f32; 3]>>]) -> 
         .map(|row| row.iter().map(|t| learned(t)).collect())
         .collect();
     let names: Vec<String> = (0..trials.len()).map(|n| std::format!("t{n}")).collect();
-    let textures = names
-        .iter()
-        .zip(&experience)
-        .map(|(name, experience)| Texture { name, experience });
+    let textures = names.iter().zip(&experience);
+    let textures = textures.map(|(name, known)| (name.as_str(), &known[..]));
     let mut out = vec![0; 100_000];
     let table = encode(&mut out, measured, &movements, textures).unwrap();
     table.as_bytes().to_vec()
@@ -91,6 +89,29 @@ pub(crate) fn known(slides: u8, mean: &[f64]) -> Whitened {
         *to = (from * 256.0).round() as i16;
     }
     known
+}
+
+/// What was learned of a texture at two movements of two features.
+const NEW: [Whitened; 2] = {
+    let mut mean = [0; crate::features::MAX_FEATURES];
+    (mean[0], mean[1]) = (9 * 256, 9 * 256);
+    [Whitened { slides: 3, mean }; 2]
+};
+
+/// Puts [`NEW`] in.
+fn put(name: &str) -> Change<'_> {
+    Change::Put {
+        name,
+        known: TextureStats::Fused(&NEW),
+        tally: Tally::default(),
+    }
+}
+
+/// A table after a change.
+fn amended(table: &[u8], change: Change<'_>) -> Vec<u8> {
+    let mut out = vec![0; 8000];
+    let amended = amend(&mut out, &Table::read(table).unwrap(), change);
+    amended.unwrap().as_bytes().to_vec()
 }
 
 /// CRC-32 of zip and Ethernet, bit by bit.
@@ -158,9 +179,7 @@ fn learned(trials: &[[f32; 3]]) -> Experience {
 
 fn encoded(textures: &[(&str, Vec<Experience>)]) -> Result<Vec<u8>, EncodeError> {
     let mut out = vec![0; 200_000];
-    let textures = textures
-        .iter()
-        .map(|(name, experience)| Texture { name, experience });
+    let textures = textures.iter().map(|(name, known)| (*name, &known[..]));
     let table = encode(&mut out, PropertySet::ALL, &MOVEMENTS, textures)?;
     Ok(table.as_bytes().to_vec())
 }
@@ -260,10 +279,7 @@ fn bytes_behind_the_table_are_left_alone() {
 
     let mut out = [0xa5; 100];
     let experience = [learned(&[[1.0; 3], [2.0; 3]]); 2];
-    let felt = Texture {
-        name: "felt",
-        experience: &experience,
-    };
+    let felt = ("felt", &experience[..]);
     let length = encode(&mut out, PropertySet::ALL, &MOVEMENTS, [felt].into_iter())
         .unwrap()
         .as_bytes()
@@ -277,10 +293,7 @@ fn what_was_not_measured_is_not_in_the_table() {
     let measured: PropertySet = [Property::Roughness].into_iter().collect();
     // a traction that no table can hold
     let experience = [learned(&[[9.0, 1.0, 2.0], [9.5, 2.0, 4.0]]); 2];
-    let felt = Texture {
-        name: "felt",
-        experience: &experience,
-    };
+    let felt = ("felt", &experience[..]);
     let mut out = [1; 200];
     let table = encode(&mut out, measured, &MOVEMENTS, [felt].into_iter()).unwrap();
     assert_eq!(
@@ -300,27 +313,10 @@ fn what_was_not_measured_is_not_in_the_table() {
 }
 
 #[test]
-fn the_study_fits_in_5_2_kb() {
+fn the_study_fits_in_5_2_kb_and_11_kb_fused() {
     assert_eq!(encoded_len(GAUSSIAN, 117, 3, 0), 5190);
-    let names: Vec<String> = (0..117).map(|n| std::format!("texture {n}")).collect();
-    let experience = [learned(&[[1.0, 2.0, 3.0], [2.0, 3.0, 4.0]]); 3];
-    let textures = names.iter().map(|name| Texture {
-        name,
-        experience: &experience,
-    });
-    let movements = [
-        Movement::FOR_TRACTION,
-        Movement::FOR_FINENESS,
-        Movement::FOR_ROUGHNESS,
-    ];
-    let names: usize = names.iter().map(|name| 1 + name.len()).sum();
-    let mut out = vec![0; encoded_len(GAUSSIAN, 117, 3, names)];
-    let table = encode(&mut out, PropertySet::ALL, &movements, textures).unwrap();
-    assert_eq!(table.as_bytes().len(), 5190 + names);
-    assert_eq!(
-        (table.textures(), table.name(116)),
-        (117, Some("texture 116"))
-    );
+    let fused = Contents::Fused(FeatureSet::Force, 13);
+    assert!(encoded_len(fused, 117, 3, 0) <= 11 << 10);
 }
 
 /// A table of any shape: names, movements, and the trials of each texture at each movement.
@@ -385,7 +381,7 @@ proptest! {
     #[test]
     fn what_is_written_reads_back((names, movements, trials) in any_table()) {
         let experience: Vec<Vec<Experience>> = trials.iter().map(|row| row.iter().map(|t| learned(t)).collect()).collect();
-        let textures = names.iter().zip(&experience).map(|(name, experience)| Texture { name, experience });
+        let textures = names.iter().zip(&experience).map(|(name, known)| (name.as_str(), &known[..]));
         let mut out = vec![0xff; 40_000];
         let table = encode(&mut out, PropertySet::ALL, &movements, textures).unwrap();
         prop_assert_eq!(usize::from(table.textures()), names.len());
@@ -419,7 +415,7 @@ proptest! {
         }
         // and written again it is the same to the bit
         let again: Vec<Vec<Experience>> = (0..table.textures()).map(|t| (0..movements.len() as u8).map(|m| table.experience(t, m)).collect()).collect();
-        let textures = names.iter().zip(&again).map(|(name, experience)| Texture { name, experience });
+        let textures = names.iter().zip(&again).map(|(name, known)| (name.as_str(), &known[..]));
         let mut copy = vec![0; 40_000];
         let copy = encode(&mut copy, PropertySet::ALL, &movements, textures).unwrap();
         prop_assert_eq!(copy.as_bytes(), table.as_bytes());
@@ -429,76 +425,55 @@ proptest! {
 #[test]
 fn what_cannot_be_written_is_refused() {
     let one = learned(&[[1.0, 2.0, 3.0]]);
-    let none = Vec::new();
-    assert_eq!(encoded(&[]), Err(EncodeError::Empty));
-    assert_eq!(
-        encoded(&[("felt", vec![one; 2]), ("oak", vec![one])]),
-        Err(EncodeError::Movements(1))
-    );
-    assert_eq!(encoded(&[("felt", none)]), Err(EncodeError::Movements(0)));
-    assert_eq!(
-        encoded(&[("felt", vec![one; 3])]),
-        Err(EncodeError::Movements(0))
-    );
     let long = "x".repeat(256);
-    assert_eq!(
-        encoded(&[("felt", vec![one; 2]), (&long, vec![one; 2])]),
-        Err(EncodeError::Name(1))
-    );
-    let bytes = encoded(&[(&long[..255], vec![one; 2])]).unwrap();
+    let two = || vec![one; 2];
+    let name = |index| EncodeError::Invalid(TableError::Name(index));
+    for (textures, why) in [
+        (vec![], EncodeError::Empty),
+        (
+            vec![("felt", two()), ("oak", vec![one])],
+            EncodeError::Movements(1),
+        ),
+        (vec![("felt", vec![])], EncodeError::Movements(0)),
+        (vec![("felt", vec![one; 3])], EncodeError::Movements(0)),
+        (vec![("felt", two()), (&long, two())], EncodeError::Name(1)),
+        (vec![("", two())], name(0)),
+        (vec![("felt", two()), ("felt", two())], name(1)),
+    ] {
+        assert_eq!(encoded(&textures), Err(why));
+    }
+    let bytes = encoded(&[(&long[..255], two())]).unwrap();
     assert_eq!(Table::read(&bytes).unwrap().name(0), Some(&long[..255]));
-    let name = |index| Err(EncodeError::Invalid(TableError::Name(index)));
-    assert_eq!(encoded(&[("", vec![one; 2])]), name(0));
-    assert_eq!(
-        encoded(&[("felt", vec![one; 2]), ("felt", vec![one; 2])]),
-        name(1)
-    );
 
     let write = |out: &mut [u8], measured, movements: &[Movement]| {
         let experience = vec![one; movements.len()];
-        let felt = Texture {
-            name: "felt",
-            experience: &experience,
-        };
+        let felt = ("felt", &experience[..]);
         encode(out, measured, movements, [felt].into_iter()).map(|table| table.as_bytes().len())
     };
     let out = &mut [0; 1000];
     let movements: Vec<Movement> = Movement::grid()
         .chain([Movement::new(150, 5000).unwrap()])
         .collect();
-    assert_eq!(
-        write(out, PropertySet::ALL, &movements[..36]),
-        Ok(encoded_len(GAUSSIAN, 1, 36, 5))
-    );
-    assert_eq!(
-        write(out, PropertySet::ALL, &movements),
-        Err(EncodeError::Empty),
-        "37 movements"
-    );
-    assert_eq!(write(out, PropertySet::ALL, &[]), Err(EncodeError::Empty));
-    assert_eq!(
-        write(out, PropertySet::default(), &MOVEMENTS),
-        Err(EncodeError::Empty)
-    );
+    let all = PropertySet::ALL;
+    let longest = encoded_len(GAUSSIAN, 1, 36, 5);
+    assert_eq!(write(out, all, &movements[..36]), Ok(longest));
+    for (measured, movements) in [
+        (all, &movements[..]),
+        (all, &[]),
+        (PropertySet::default(), &MOVEMENTS),
+    ] {
+        assert_eq!(write(out, measured, movements), Err(EncodeError::Empty));
+    }
     let twice = [MOVEMENTS[0], MOVEMENTS[1], MOVEMENTS[0]];
     let twin = EncodeError::Invalid(TableError::TwinMovement(2));
-    assert_eq!(write(out, PropertySet::ALL, &twice), Err(twin));
+    assert_eq!(write(out, all, &twice), Err(twin));
     let length = encoded_len(GAUSSIAN, 1, 2, 5);
-    assert_eq!(
-        write(&mut out[..length], PropertySet::ALL, &MOVEMENTS),
-        Ok(length)
-    );
+    assert_eq!(write(&mut out[..length], all, &MOVEMENTS), Ok(length));
     let buffer = Err(EncodeError::NoSpace(length));
-    assert_eq!(
-        write(&mut out[..length - 1], PropertySet::ALL, &MOVEMENTS),
-        buffer
-    );
+    assert_eq!(write(&mut out[..length - 1], all, &MOVEMENTS), buffer);
 
     let names: Vec<String> = (0..65536).map(|n| n.to_string()).collect();
-    let textures = names.iter().map(|name| Texture {
-        name,
-        experience: &[],
-    });
+    let textures = names.iter().map(|name| (name.as_str(), &[][..]));
     let too_many = encode(out, PropertySet::ALL, &MOVEMENTS, textures).map(|_| ());
     assert!(matches!(too_many, Err(EncodeError::NoSpace(bytes)) if bytes > 65536 * 26));
 }

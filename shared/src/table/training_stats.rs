@@ -19,9 +19,7 @@ impl Experience {
     /// experience as it was.
     ///
     /// After 255 trials the older ones are slowly forgotten: each new one has the weight of one in 255.
-    ///
-    /// # Errors
-    /// The property of `measured` that the trial lacks.
+    /// Errors: the property of `measured` that the trial lacks.
     pub fn learn(&mut self, measured: PropertySet, trial: &Properties) -> Result<(), Property> {
         let mut next = *self;
         next.trials = self.trials.saturating_add(1);
@@ -77,7 +75,7 @@ impl Whitened {
     /// Slides that count at most when a texture is learned on the go: the mean follows what changes slowly. With the 8
     /// of the recipe it lags behind a real session's drift, until nothing passes the gate any more and the texture is
     /// lost; 3 was chosen on one half of the materials and holds on the other (tests/fused_recipe.rs).
-    pub const MEMORY: u8 = 3;
+    pub(crate) const MEMORY: u8 = 3;
 
     /// Takes in a whitened slide of a training: all have the same weight.
     pub fn teach(&mut self, slide: &[i16]) {

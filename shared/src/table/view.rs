@@ -4,7 +4,7 @@ use super::format::{
     Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, HEADER, LABEL_BYTES, LENGTH, Layout, MAGIC,
     MAX_MOVEMENTS, MOVEMENT_BYTES, MS, TWO, TableError, Tally, VERSION, array, each,
 };
-use super::gaussian::{Gaussian, Gaussians, SD_STEP, mean_step};
+use super::gaussian::{Gaussian, Gaussians, mean_step};
 use super::training_stats::Whitened;
 use super::whitening::{Column, View, Whitening};
 use crate::CRC32;
@@ -39,21 +39,20 @@ pub(super) struct Length<'a> {
 
 impl<'a> Table<'a> {
     /// Checks the table at the beginning of `bytes` and borrows it; what follows it is left alone.
-    ///
-    /// # Errors
-    /// The first check that failed.
+    /// Errors: the first check that failed.
     #[inline]
     pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
         let truncated = |wanted| TableError::Truncated {
             got: bytes.len(),
             wanted,
         };
-        let header: &[u8; HEADER] = bytes.first_chunk().ok_or(truncated(HEADER))?;
+        let header: [u8; HEADER] = array(bytes, 0).ok_or(truncated(HEADER))?;
+        let [magic @ .., _, _, _, _, _, _, _, _, _, _, _, _] = header;
+        if magic != MAGIC {
+            return Err(TableError::Magic(magic));
+        }
         let [
-            m0,
-            m1,
-            m2,
-            m3,
+            ..,
             v0,
             v1,
             code,
@@ -66,10 +65,7 @@ impl<'a> Table<'a> {
             t1,
             movements,
             features,
-        ] = *header;
-        if [m0, m1, m2, m3] != MAGIC {
-            return Err(TableError::Magic([m0, m1, m2, m3]));
-        }
+        ] = header;
         let version = u16::from_le_bytes([v0, v1]);
         if version != VERSION {
             return Err(TableError::Version(version));
@@ -111,7 +107,6 @@ impl<'a> Table<'a> {
         Ok(table)
     }
 
-    /// Returns the end of the names.
     #[inline]
     fn check(&self) -> Result<usize, TableError> {
         let mut at = self.layout().names;
@@ -185,13 +180,11 @@ impl<'a> Table<'a> {
             .layout(self.textures.into(), self.movements.into())
     }
 
-    /// The contents of the section of a kind.
     pub(super) fn section(&self, wanted: u16) -> Option<&'a [u8]> {
         let mut each = each(self.sections).flatten();
         each.find_map(|(kind, contents)| (kind == wanted).then_some(contents))
     }
 
-    /// The lengths that it knows, the shortest first.
     pub(super) fn lengths(&self) -> impl Iterator<Item = Length<'a>> + Clone + use<'a> {
         let table = *self;
         let sections = each(self.sections)
@@ -219,27 +212,28 @@ impl<'a> Table<'a> {
         Some(Length { ms, table, rest })
     }
 
-    /// The table of the length that a movement stands for, and which of its movements that is; `None` for whole slides.
-    #[inline(always)]
-    pub(super) fn shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        if movement < self.movements {
-            return None;
+    /// The table of the length that a movement stands for, this one for whole slides, and which of its movements that
+    /// is; `None` outside.
+    #[inline]
+    pub(super) fn at(&self, movement: u8) -> Option<(Table<'a>, u8)> {
+        match movement < self.movements {
+            true => Some((*self, movement)),
+            false => self.find_shorter(movement),
         }
-        self.find_shorter(movement)
     }
 
     /// Once in the image, not wherever a table is read.
     #[cold]
     #[inline(never)]
     fn find_shorter(&self, movement: u8) -> Option<(Table<'a>, u8)> {
-        let mut left = movement;
-        for length in self.lengths() {
-            left = left.checked_sub(self.movements)?;
-            if left < self.movements {
-                return Some((length.table, left));
-            }
-        }
-        None
+        let number = movement.checked_div(self.movements)?.checked_sub(1)?;
+        let length = self.lengths().nth(number.into())?;
+        Some((length.table, movement % self.movements))
+    }
+
+    fn place(&self, texture: u16, movement: u8) -> Option<usize> {
+        let place = usize::from(texture) * usize::from(self.movements) + usize::from(movement);
+        (texture < self.textures).then_some(place)
     }
 
     fn stored_movement(&self, index: u8) -> Option<(u16, u32)> {
@@ -250,22 +244,13 @@ impl<'a> Table<'a> {
         ))
     }
 
-    /// The bytes of a texture's cell at a movement.
     pub(super) fn cell_bytes(&self, texture: u16, movement: u8) -> Option<&'a [u8]> {
-        if let Some((shorter, movement)) = self.shorter(movement) {
-            return shorter.cell_bytes(texture, movement);
-        }
-        if texture >= self.textures || movement >= self.movements {
-            return None;
-        }
-        let (_, cell) = self.contents.sizes();
-        let index = usize::from(texture) * usize::from(self.movements) + usize::from(movement);
-        self.bytes
-            .get(self.layout().cells + index * cell..)?
-            .get(..cell)
+        let (table, movement) = self.at(movement)?;
+        let (_, cell) = table.contents.sizes();
+        let at = table.layout().cells + table.place(texture, movement)? * cell;
+        table.bytes.get(at..)?.get(..cell)
     }
 
-    /// Stored mean and standard deviation of a property that was measured.
     pub(super) fn cell(
         &self,
         texture: u16,
@@ -281,9 +266,7 @@ impl<'a> Table<'a> {
     }
 
     /// The bytes of the name at `at`, and where the next one begins; the checksum is no name.
-    ///
-    /// # Errors
-    /// The error is the end that the name would have.
+    /// Errors: the error is the end that the name would have.
     fn name_at(&self, at: usize) -> Result<(&'a [u8], usize), usize> {
         let (body, _) = self.bytes.split_last_chunk::<CRC_BYTES>().ok_or(at)?;
         let end = at + 1 + usize::from(*body.get(at).ok_or(at + 1)?);
@@ -359,57 +342,40 @@ impl<'a> Table<'a> {
 
     /// Number of trials that a texture was learned from at a movement, 255 for more.
     pub fn trials(&self, texture: u16, movement: u8) -> u8 {
-        if let Some((shorter, movement)) = self.shorter(movement) {
-            return shorter.trials(texture, movement);
-        }
-        if texture >= self.textures || movement >= self.movements {
-            return 0;
-        }
-        let at = self.layout().trials
-            + usize::from(texture) * usize::from(self.movements)
-            + usize::from(movement);
-        self.bytes.get(at).copied().unwrap_or(0)
+        let trials = self.at(movement).and_then(|(table, movement)| {
+            let at = table.layout().trials + table.place(texture, movement)?;
+            table.bytes.get(at).copied()
+        });
+        trials.unwrap_or(0)
     }
 
     /// The expected distribution of a property of a texture; `None` where fewer than two trials were made, for a
     /// property that was not measured, and outside the table.
     pub fn gaussian(&self, texture: u16, action: Action) -> Option<Gaussian> {
-        if self.trials(texture, action.movement) < 2 {
-            return None;
-        }
-        let property = action.property?;
-        let (mean, sd) = self.cell(texture, action.movement, property)?;
-        Some(Gaussian {
-            mean: f32::from(mean) * mean_step(property),
-            sd: f32::from(sd) * SD_STEP,
-        })
+        self.gaussians(action).get(texture.into())
     }
 
     /// [`Table::gaussian`] of every texture, for those who ask for many.
     pub fn gaussians(&self, action: Action) -> Gaussians<'a> {
-        if let Some((shorter, movement)) = self.shorter(action.movement) {
-            return shorter.gaussians(Action { movement, ..action });
-        }
-        let movement = usize::from(action.movement);
-        let measured = action.property.filter(|p| self.measured().contains(*p));
-        let measured = measured.filter(|_| action.movement < self.movements);
-        let (_, cell) = self.contents.sizes();
-        let layout = self.layout();
-        let cells = measured.and_then(|property| {
-            let at = layout.cells + movement * cell + property.index() * CELL_BYTES;
-            self.bytes.get(at..layout.trials)
+        let property = action.property.filter(|p| self.measured().contains(*p));
+        let found = self.at(action.movement).zip(property);
+        let cells = found.and_then(|((table, movement), property)| {
+            let layout = table.layout();
+            let (_, cell) = table.contents.sizes();
+            let at = layout.cells + usize::from(movement) * cell + property.index() * CELL_BYTES;
+            table.bytes.get(at..layout.trials)
         });
         let (trials, movements) = self.trials_at(action.movement);
+        let (_, cell) = self.contents.sizes();
         Gaussians {
             cells: cells.unwrap_or_default(),
             trials,
             movements,
             stride: cell * movements,
-            step: measured.map_or(0.0, mean_step),
+            step: property.map_or(0.0, mean_step),
         }
     }
 
-    /// Number of features of a fused table.
     pub(super) fn features(&self) -> usize {
         match self.contents {
             Contents::Fused(_, features) => features.into(),
@@ -420,26 +386,23 @@ impl<'a> Table<'a> {
     /// [`Table::trials`] of every texture, the first at the beginning, and how far one is from the next; none outside
     /// the table.
     pub(super) fn trials_at(&self, movement: u8) -> (&'a [u8], usize) {
-        let layout = self.layout();
-        let at = layout.trials + usize::from(movement);
-        let trials = self.bytes.get(at..layout.lineage);
-        let trials = trials.filter(|_| movement < self.movements);
+        let trials = self.at(movement).and_then(|(table, movement)| {
+            let layout = table.layout();
+            let at = layout.trials + usize::from(movement);
+            table.bytes.get(at..layout.lineage)
+        });
         (trials.unwrap_or_default(), self.movements.into())
     }
 
     /// The whitened means at a movement; none in a table of Gaussians and outside the table.
     pub(crate) fn column(&self, movement: u8) -> Column<'a> {
-        if let Some((shorter, movement)) = self.shorter(movement) {
-            return shorter.column(movement);
-        }
         let (_, cell) = self.contents.sizes();
-        let at = self.layout().cells + usize::from(movement) * cell;
-        let means = match self.contents {
-            Contents::Fused(..) if movement < self.movements => {
-                self.bytes.get(at..self.layout().trials)
-            }
-            _ => None,
-        };
+        let means = self.at(movement).and_then(|(table, movement)| {
+            let layout = table.layout();
+            let at = layout.cells + usize::from(movement) * cell;
+            table.bytes.get(at..layout.trials)
+        });
+        let means = means.filter(|_| self.features() > 0);
         let (slides, movements) = self.trials_at(movement);
         Column {
             means: means.unwrap_or_default(),
@@ -451,24 +414,20 @@ impl<'a> Table<'a> {
 
     /// The whitening of features at a movement; `None` in a table of Gaussians and outside the table.
     pub fn whitening(&self, movement: u8) -> Option<Whitening> {
-        let (bytes, features) = self.bytes_from_whitening(movement)?;
-        Whitening::read(bytes.get(..Whitening::bytes(features))?, features)
+        let View { features, bytes } = self.whitening_at(movement)?;
+        Whitening::read(bytes, features)
     }
 
-    /// The bytes of the whitening at a movement and all behind it, and of how many features it is.
-    fn bytes_from_whitening(&self, movement: u8) -> Option<(&'a [u8], usize)> {
-        if let Some((shorter, movement)) = self.shorter(movement) {
-            return shorter.bytes_from_whitening(movement);
-        }
+    fn whitening_at(&self, movement: u8) -> Option<View<'a>> {
         let Contents::Fused(_, features) = self.contents else {
             return None;
         };
-        if movement >= self.movements {
-            return None;
-        }
-        let length = Whitening::bytes(features.into());
-        let at = self.layout().whitenings + usize::from(movement) * length;
-        Some((self.bytes.get(at..)?, features.into()))
+        let (table, movement) = self.at(movement)?;
+        let features = usize::from(features);
+        let length = Whitening::bytes(features);
+        let at = table.layout().whitenings + usize::from(movement) * length;
+        let bytes = table.bytes.get(at..)?.get(..length)?;
+        Some(View { features, bytes })
     }
 
     /// The whitened mean of a texture at a movement, in steps of 1/256 standard deviation; none in a table of Gaussians
@@ -482,10 +441,8 @@ impl<'a> Table<'a> {
             Contents::Fused(..) => self.cell_bytes(texture, movement).unwrap_or_default(),
             Contents::Gaussians(_) => &[],
         };
-        cells.chunks_exact(2).map(|pair| match pair {
-            &[low, high] => i16::from_le_bytes([low, high]),
-            _ => 0,
-        })
+        let (numbers, _) = cells.as_chunks();
+        numbers.iter().map(|two| i16::from_le_bytes(*two))
     }
 
     /// The statistics of a texture at a movement in a fused table, to go on from.
@@ -506,8 +463,7 @@ impl<'a> Table<'a> {
 
     /// Whitens features at a movement; `None` as [`Table::whitening`].
     pub fn whiten(&self, movement: u8, features: &[i16]) -> Option<Vector> {
-        let (bytes, known) = self.bytes_from_whitening(movement)?;
-        Some(View::checked(bytes, known).apply(features))
+        Some(self.whitening_at(movement)?.apply(features))
     }
 
     fn label(&self, texture: u16) -> [u8; LABEL_BYTES] {
@@ -524,7 +480,7 @@ impl<'a> Table<'a> {
 
     /// The number that one more texture gets.
     #[inline]
-    pub fn next_number(&self) -> u16 {
+    pub(crate) fn next_number(&self) -> u16 {
         let numbers = (0..self.textures).map(|texture| self.number(texture));
         numbers.max().map_or(0, |most| most.wrapping_add(1))
     }

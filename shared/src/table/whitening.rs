@@ -70,11 +70,7 @@ impl Whitening {
 
     /// The whitened change that a change of the features by so many steps makes, to the nearest 1/256.
     pub fn change(&self, steps: &[f64; MAX_FEATURES]) -> Slope {
-        let view = View {
-            features: self.features,
-            bytes: &self.bytes,
-        };
-        let [_, places, rows] = view.parts();
+        let [_, places, rows] = self.view().parts();
         // steps of whitened features are coarser
         let coarser = f64::from(FEATURE_STEPS / WHITE_STEPS);
         let mut change = Slope::default();
@@ -91,11 +87,15 @@ impl Whitening {
 
     /// Whitens the features of a slide; those that are missing count as the mean, those beyond the table's not at all.
     pub fn apply(&self, features: &[i16]) -> Vector {
-        let view = View {
-            features: self.features,
-            bytes: &self.bytes,
-        };
-        view.apply(features)
+        self.view().apply(features)
+    }
+
+    fn view(&self) -> View<'_> {
+        let Self {
+            features,
+            ref bytes,
+        } = *self;
+        View { features, bytes }
     }
 }
 
@@ -105,8 +105,8 @@ pub type Slope = [i16; MAX_FEATURES];
 /// A [`Whitening`] where its table lies: copying it takes as long as applying it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'b> {
-    features: usize,
-    bytes: &'b [u8],
+    pub(super) features: usize,
+    pub(super) bytes: &'b [u8],
 }
 
 impl<'b> View<'b> {
@@ -120,12 +120,6 @@ impl<'b> View<'b> {
         places.iter().all(|&p| p <= 30).then_some(view)
     }
 
-    /// Of bytes that [`View::new`] has found to be one.
-    pub(crate) fn checked(bytes: &'b [u8], features: usize) -> Self {
-        Self { features, bytes }
-    }
-
-    /// g, places and rows.
     fn parts(&self) -> [&'b [u8]; 3] {
         let (mean, rest) = self
             .bytes
@@ -135,7 +129,6 @@ impl<'b> View<'b> {
         [mean, places, rows]
     }
 
-    /// As [`Whitening::apply`].
     #[inline(never)]
     pub(crate) fn apply(&self, features: &[i16]) -> Vector {
         let [mean, places, rows] = self.parts();
@@ -152,7 +145,6 @@ impl<'b> View<'b> {
     }
 }
 
-/// The sum of the products of the numbers of a row with others.
 #[inline]
 fn product(row: &[u8], others: &[i16; MAX_FEATURES]) -> i64 {
     let pairs = row.as_chunks().0.iter().zip(others);
@@ -195,13 +187,11 @@ pub(crate) struct Column<'t> {
 }
 
 impl<'t> Column<'t> {
-    /// The bytes from the mean of a texture on.
     #[inline]
     pub(crate) fn mean(&self, texture: usize) -> &'t [u8] {
         self.means.get(texture * self.stride..).unwrap_or_default()
     }
 
-    /// The number of slides that a texture was learned from.
     #[inline]
     pub(crate) fn slides(&self, texture: usize) -> u8 {
         self.slides

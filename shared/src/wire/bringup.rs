@@ -1,12 +1,11 @@
-//! What the host and the self-test image say to each other while a new rig is brought up: the board measures, the host judges.
+//! What the host and the self-test image say to each other while a new rig is brought up: the board measures, the host
+//! judges.
 //!
-//! Frames are those of the link. [`MARK`] stands where a [`Request`](super::Request) and a [`Report`](super::Report) have the
-//! number of their variant, and none has this one: the images of the rig and of the handheld take such a frame for damaged, and
-//! the self-test takes no frame of theirs.
+//! Frames are those of the link. [`MARK`] stands where a [`Request`](super::Request) and a [`Report`](super::Report)
+//! have the number of their variant, and none has this one: the images of the rig and of the handheld take such a frame
+//! for damaged, and the self-test takes no frame of theirs.
 
 pub mod limits;
-
-use core::fmt;
 
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
@@ -62,8 +61,8 @@ pub enum Measure {
     Look,
     /// Waits for 30 s until somebody squeezes the finger in the hand and lays it down: from then on motors may move.
     Squeeze,
-    /// So many steps of the lever, downwards positive, 3200 at most; up, to its switch at most. A series of steps / 4 and of
-    /// P_DC above its rest, counts * 16.
+    /// So many steps of the lever, downwards positive, 3200 at most; up, to its switch at most. A series of steps / 4
+    /// and of P_DC above its rest, counts * 16.
     Lever(i16),
     /// Up to the switch, by 20 mm at most.
     LeverTop,
@@ -189,9 +188,10 @@ pub struct PinsSeen {
 }
 
 impl PinsSeen {
-    /// What a pin is tied to. One that is low when pulled up and high when pulled down changed by itself meanwhile: driven low.
+    /// What a pin is tied to. One that is low when pulled up and high when pulled down changed by itself meanwhile:
+    /// driven low.
     pub fn tied(&self, pin: Pin) -> Tied {
-        let bit = Pin::ALL.iter().position(|one| *one == pin).unwrap_or(0);
+        let bit = pin as u16;
         match (self.up >> bit & 1, self.down >> bit & 1) {
             (1, 0) => Tied::Floating,
             (1, _) => Tied::High,
@@ -236,7 +236,8 @@ pub struct Look {
     pub e_stop: bool,
     /// Count of the encoder since the start.
     pub encoder: i32,
-    /// Conversions of the motor's current over some 80 ms, counts: mean, standard deviation. `None`: nothing is converted.
+    /// Conversions of the motor's current over some 80 ms, counts: mean, standard deviation. `None`: nothing is
+    /// converted.
     pub current: Option<[f32; 2]>,
 }
 
@@ -268,74 +269,46 @@ pub struct StageSeen {
     pub ended: Result<(), Stopped>,
 }
 
-/// Why a motor was stopped, or did not start.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+/// The reasons why a motor was stopped, or did not start.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum Stopped {
-    /// Nobody squeezed the finger since the board started, or since a motor was stopped for the finger's sake.
+    #[error("the finger was not squeezed in the hand before")]
     NotSqueezed,
-    /// Nobody squeezed it and laid it down in 30 s.
+    #[error("nobody squeezed it and laid it down")]
     NobodySqueezed,
-    /// Of the four switches.
+    #[error("a switch is open")]
     SwitchOpen,
-    /// The emergency stop.
+    #[error("emergency stop")]
     EStop,
-    /// A limit switch of the stage.
+    #[error("it ran into a limit switch: push it to its middle and run the test again")]
     Limit,
-    /// P_DC rises.
+    #[error(
+        "P_DC rises: the finger is on its mount, or somebody holds it. If the lever went down, DIR is inverted"
+    )]
     Pressed,
-    /// P_DC says nothing.
+    #[error("P_DC says nothing, so nobody would see the finger pressed")]
     Silent,
-    /// The lever's switch stays closed.
+    #[error("the switch at its top stays closed on the way up: it does not move, or moves down")]
     TopStaysClosed,
-    /// It stays open.
+    #[error(
+        "the switch at its top stays open 2 mm below: its wire is broken, or the lever does not move"
+    )]
     TopStaysOpen,
-    /// It opened too early.
+    #[error("it came back to its switch too early: it loses steps on the way down")]
     TopTooEarly,
-    /// The encoder counts the other way.
+    #[error("the encoder counts backwards: swap its lines A and B, or the motor's wires")]
     Backwards,
-    /// The motor draws hardly any current.
+    #[error("hardly any current: the motor, the bridge's enable or its supply")]
     NoCurrent,
-    /// The encoder stands.
+    #[error("the encoder does not count: a line of it is cut, or the stage does not move")]
     NoCount,
-    /// The stage moves although a resistor is in the place of its motor.
+    #[error("the stage moves: its motor is still connected")]
     Moves,
-    /// The current is not converted.
+    #[error("the motor's current is not converted")]
     Converter,
-    /// Another question came.
+    #[error("another question came")]
     Asked,
-}
-
-impl fmt::Display for Stopped {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotSqueezed => "the finger was not squeezed in the hand before",
-            Self::NobodySqueezed => "nobody squeezed it and laid it down",
-            Self::SwitchOpen => "a switch is open",
-            Self::EStop => "emergency stop",
-            Self::Limit => "it ran into a limit switch: push it to its middle and run the test again",
-            Self::Pressed => {
-                "P_DC rises: the finger is on its mount, or somebody holds it. If the lever went down, DIR is inverted"
-            }
-            Self::Silent => "P_DC says nothing, so nobody would see the finger pressed",
-            Self::TopStaysClosed => {
-                "the switch at its top stays closed on the way up: it does not move, or moves down"
-            }
-            Self::TopStaysOpen => {
-                "the switch at its top stays open 2 mm below: its wire is broken, or the lever does not move"
-            }
-            Self::TopTooEarly => "it came back to its switch too early: it loses steps on the way down",
-            Self::Backwards => {
-                "the encoder counts backwards: swap its lines A and B, or the motor's wires"
-            }
-            Self::NoCurrent => "hardly any current: the motor, the bridge's enable or its supply",
-            Self::NoCount => {
-                "the encoder does not count: a line of it is cut, or the stage does not move"
-            }
-            Self::Moves => "the stage moves: its motor is still connected",
-            Self::Converter => "the motor's current is not converted",
-            Self::Asked => "another question came",
-        })
-    }
 }
 
 #[cfg(test)]

@@ -31,8 +31,8 @@ pub enum Command {
     Stop,
     /// Finds out what lies under the finger.
     Identify(Identify),
-    /// The label of the texture in the last exploration: one of the textures known, or a new one. The probe learns it from
-    /// the slides of that exploration.
+    /// The label of the texture in the last exploration: one of the textures known, or a new one. The probe learns it
+    /// from the slides of that exploration.
     Label(Name),
     /// Learns what lies under the finger.
     Train(Train),
@@ -71,19 +71,19 @@ pub enum Command {
     FactoryTable,
     /// Measures P_DC under a weight of so many mN that a person puts on the finger: [`super::Event::Weighed`].
     Weigh(u16),
-    /// Finds out whether what lies under the finger is the one texture it is among: [`super::Event::Verified`] after every
-    /// slide, and no verdict.
+    /// Finds out whether what lies under the finger is the one texture it is among: [`super::Event::Verified`] after
+    /// every slide, and no verdict.
     Verify(Identify),
-    /// Keeps the share of false alarms that limits are for, where a request does not say otherwise; `None`: each table's
-    /// own.
+    /// Keeps the share of false alarms that limits are for, where a request does not say otherwise; `None`: each
+    /// table's own.
     SetFalseAlarm(Option<f32>),
-    /// Keeps whether movements may press with up to 2 N: only for a finger whose mount yields, or whose lever is stopped, before
-    /// 2.2 N.
+    /// Keeps whether movements may press with up to 2 N: only for a finger whose mount yields, or whose lever is
+    /// stopped, before 2.2 N.
     SetHighForce(bool),
     /// Measures gravity along a finger with an accelerometer, which a person turns over: [`super::Event::Turned`].
     TurnOver,
-    /// An arm that moves the finger says how far it has come with what [`super::Event::Arm`] asked for: whenever that changes, and at
-    /// least every 100 ms while it is open. Only a probe that an arm moves takes it, at any time.
+    /// An arm that moves the finger says how far it has come with what [`super::Event::Arm`] asked for: whenever that
+    /// changes, and at least every 100 ms while it is open. Only a probe that an arm moves takes it, at any time.
     Arm(ArmReport),
 }
 
@@ -112,7 +112,8 @@ pub struct Identify {
 }
 
 impl Default for Identify {
-    /// Among all textures, by the table's own method: until one is more probable than 0.99, with at most 10 slides (PAPER).
+    /// Among all textures, by the table's own method: until one is more probable than 0.99, with at most 10 slides
+    /// (PAPER).
     fn default() -> Self {
         Self {
             among: Vec::new(),
@@ -161,7 +162,8 @@ pub struct Train {
     pub name: Name,
     /// How often each movement is to have been made in the end.
     pub trials: u8,
-    /// All movements of the grid up to 1.26 N, or 2 N where [`Command::SetHighForce`] allows it, instead of those of the table.
+    /// All movements of the grid up to 1.26 N, or 2 N where [`Command::SetHighForce`] allows it, instead of those of
+    /// the table.
     pub pilot: bool,
     /// For where on the sample slides begin.
     pub seed: u32,

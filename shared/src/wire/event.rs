@@ -153,11 +153,11 @@ pub enum Event {
         /// Its zero is off by so many counts.
         offset_counts: f32,
     },
-    /// The slide whose report comes next ended early, after so many ms at constant speed, for the verdict is certain: it is reported
-    /// as it was then.
+    /// The slide whose report comes next ended early, after so many ms at constant speed, for the verdict is certain:
+    /// it is reported as it was then.
     Early(u16),
-    /// The arm that moves the finger is to do this, in the place of what it does; said again until the arm answers, with
-    /// [`super::Command::Arm`].
+    /// The arm that moves the finger is to do this, in the place of what it does; said again until the arm answers,
+    /// with [`super::Command::Arm`].
     Arm(ArmOrder),
 }
 

@@ -21,9 +21,6 @@ const CRC_BYTES: usize = 4;
 pub struct TooLong;
 
 /// A frame of `message`, its closing 0 included, at the beginning of `buffer`.
-///
-/// # Errors
-/// [`TooLong`].
 pub fn encode<'r, M: Serialize>(
     message: &M,
     buffer: &'r mut [u8; MAX_FRAME + 1],
@@ -49,25 +46,19 @@ pub fn encode<'r, M: Serialize>(
 
 /// What is wrong with a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[allow(missing_docs)] // their texts say it
 pub enum FrameError {
-    /// More bytes without a 0 than any frame has.
     #[error("the frame is too long")]
     TooLong,
-    /// No COBS.
     #[error("the frame is damaged (COBS)")]
     Cobs,
-    /// The CRC differs.
     #[error("the frame is damaged (CRC)")]
     Crc,
-    /// Whole, and no message of this protocol.
     #[error("the frame is no message: do both ends have the same version?")]
     Message,
 }
 
 /// The message in a frame without its closing 0; the frame is used up.
-///
-/// # Errors
-/// See [`FrameError`].
 pub fn decode<M: DeserializeOwned>(frame: &mut [u8]) -> Result<M, FrameError> {
     let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Cobs)?;
     let whole = frame.get(..length).ok_or(FrameError::Cobs)?;

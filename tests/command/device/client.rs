@@ -1,12 +1,20 @@
-//! The client that the book has beside the page of the link: 140 lines of Python, which know the messages from `wire.json` alone.
+//! The client that the book has beside the page of the link: 140 lines of Python, which know the messages from
+//! `wire.json` alone.
 
-use super::*;
-use flate2::read::GzDecoder;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+use std::thread;
+
 use serde_json::Value;
 use tactus_core::features::Movement;
 use tactus_core::rig::{FAULTS, RigError};
-use tactus_core::sensor::FingerName;
+use tactus_core::sensor::{FingerCode, FingerName};
+use tactus_core::table::Name;
+use tactus_core::wire::{self, Event, Forget, MAX_FRAME, PROTOCOL, Report, Request, Reset};
 use tactus_core::wire::{Again, Failure, Identify, MemoryError, Prompt, Rejection, Train};
+
+use super::software::Bench;
+use crate::Scratch;
 
 const PAGES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src");
 /// Reports in frames from stdin, as lines of JSON; requests as lines of JSON after them, as frames in hexadecimal.
@@ -81,13 +89,7 @@ fn same(ours: &Value, theirs: &Value) -> bool {
 fn reports() -> Vec<Report> {
     let mut reports = Vec::new();
     for log in ["identify", "learning"] {
-        let path = format!(
-            "{}/../../tests/golden/{log}.jsonl.gz",
-            env!("CARGO_MANIFEST_DIR")
-        );
-        let mut lines = String::new();
-        let mut file = GzDecoder::new(fs::File::open(path).unwrap());
-        file.read_to_string(&mut lines).unwrap();
+        let lines = Scratch::new().log(log);
         for line in lines.lines() {
             let line: Value = serde_json::from_str(line).unwrap();
             if let Some(report) = line.get("report") {
@@ -188,17 +190,14 @@ fn another_language_reads_and_writes_every_message_by_the_schema() {
 #[test]
 fn a_client_of_another_language_identifies() {
     let Some(mut client) = python() else { return };
-    let (at, asked) = probe(1000);
-    let told: Value = {
-        let ours = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
-        object(&ours, 0)
-    };
-    while asked.try_recv().is_ok() {}
+    let bench = Bench::new(1000);
+    let told = bench.json("identify --seed 7", 0);
+    bench.asked();
     let wanted = r#"{"threshold": 0.99, "max_slides": 10, "open": true, "seed": 7}"#;
     let out = client
-        .args(["client.py", &at, "Identify", wanted])
-        .output()
-        .unwrap();
+        .args(["client.py", &bench.port, "Identify", wanted])
+        .output();
+    let out = out.unwrap();
     assert_eq!(out.status.code(), Some(0), "{out:?}");
     let reports = String::from_utf8(out.stdout).unwrap();
     let reports = reports
@@ -214,10 +213,13 @@ fn a_client_of_another_language_identifies() {
         verdict["slides"].as_u64(),
         told["slides"].as_array().map(|all| all.len() as u64)
     );
-    assert!(matches!(asked.try_recv(), Ok(wire::Command::Identify(_))));
+    assert!(matches!(
+        bench.asked()[..],
+        [wire::Command::Identify(_), ..]
+    ));
     let refused = python()
         .unwrap()
-        .args(["client.py", &at, "Forget", r#"{"Texture": "none"}"#])
+        .args(["client.py", &bench.port, "Forget", r#"{"Texture": "none"}"#])
         .output()
         .unwrap();
     assert_eq!(refused.status.code(), Some(1), "{refused:?}");

@@ -1,7 +1,11 @@
-//! The Python package at the probe in software. `cargo xtask test --step python` says which Python has it; without one there is
-//! nothing to test here.
+//! The Python package at the probe in software. `cargo xtask test --step python` says which Python has it; without one
+//! there is nothing to test here.
 
-use super::*;
+use std::process::{Command, Output};
+
+use tactus_lab::sim::collection::texture_name;
+
+use super::software::{Bench, UNKNOWN};
 
 /// What a user would write: everything that moves, at a probe of three textures with the second one under its finger.
 const SESSION: &str = "
@@ -45,14 +49,13 @@ fn a_session_in_python_is_that_of_the_command() {
     let Some(python) = std::env::var_os("TACTUS_PYTHON") else {
         return;
     };
-    let (at, _) = probe(1000);
+    let bench = Bench::new(1000);
     // before the session, for it teaches what lies under the finger by a second name
-    let before = ["identify", "--port", &at, "--seed", "7", "--format", "json"];
-    let found = object(&before, 0);
-    let temp = tempfile::tempdir().unwrap();
-    let log = temp.path().join("session.jsonl");
+    let found = bench.json("identify --seed 7", 0);
     let mut session = Command::new(python);
-    session.args(["-c", SESSION, &at, path(&log)]);
+    session
+        .args(["-c", SESSION, &bench.port])
+        .arg(bench.at.path("log"));
     session.env("XDG_RUNTIME_DIR", env!("CARGO_TARGET_TMPDIR"));
     let Output { stdout, stderr, .. } = session.output().unwrap();
     let said = String::from_utf8_lossy(&stderr);
@@ -60,8 +63,7 @@ fn a_session_in_python_is_that_of_the_command() {
     assert_eq!(verdict["name"], found["verdict"]["texture"]);
     assert_eq!(verdict["name"], texture_name(UNKNOWN));
     // the command reads what the package wrote
-    let replayed = object(&["log", "replay", path(&log), "--format", "json"], 0);
-    assert_eq!(replayed["same"], true, "{replayed}");
+    bench.at.printed("device log log");
 }
 
 #[test]
@@ -76,18 +78,18 @@ fn the_live_example_plots_a_probe_while_it_explores() {
         tactus_tests::skipped("no matplotlib: pip install matplotlib");
         return;
     }
-    let (at, _) = probe(1000);
-    let temp = tempfile::tempdir().unwrap();
-    let [picture, log] = ["live.png", "session.jsonl"].map(|name| temp.path().join(name));
+    let bench = Bench::new(1000);
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../python/examples/live.py");
     let mut live = Command::new(python);
-    live.args([example, &at, path(&picture), path(&log)]);
+    live.args([example, &bench.port]);
+    live.args(["live.png", "session.jsonl"].map(|name| bench.at.path(name)));
     live.env("XDG_RUNTIME_DIR", env!("CARGO_TARGET_TMPDIR"));
     let Output { stdout, stderr, .. } = live.output().unwrap();
     let said = String::from_utf8(stdout).unwrap();
     let why = String::from_utf8_lossy(&stderr);
     assert!(said.starts_with("slide 1 comes\n"), "{said}{why}");
     assert!(said.contains(texture_name(UNKNOWN)), "{said}{why}");
-    assert!(fs::read(picture).unwrap().starts_with(b"\x89PNG"));
-    assert!(fs::read_to_string(log).unwrap().contains("Verdict"));
+    assert!(bench.at.read("live.png").starts_with(b"\x89PNG"));
+    let log = String::from_utf8(bench.at.read("session.jsonl"));
+    assert!(log.unwrap().contains("Verdict"));
 }

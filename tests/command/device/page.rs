@@ -1,11 +1,22 @@
-//! What a page does with a probe at a port, `tactus_lab::remote`: its bytes are carried here, and it says what the command says.
+//! What a page does with a probe at a port, `tactus_lab::remote`: its bytes are carried here, and it says what the
+//! command says.
 
+use std::fs;
 use std::io::ErrorKind::{TimedOut, WouldBlock};
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use tactus_core::table::Table;
+use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::remote::Remote;
 
-use super::*;
+use super::software::{Bench, known, line};
+use crate::{array, assert_says};
+
+const STOPPED: &str = "stopped: the finger is lifted and the stage stands";
 
 /// A page's end of a line.
 struct Page {
@@ -36,7 +47,7 @@ impl Page {
             line,
             began: Instant::now(),
         };
-        let got = page.done(&json!({"do": "connect", "port": at, "now_ms": 0}), |_| None);
+        let got = page.until_done(&json!({"do": "connect", "port": at, "now_ms": 0}), |_| None);
         (page, got)
     }
 
@@ -50,7 +61,7 @@ impl Page {
     }
 
     /// Asks, and carries bytes until all is done; `meanwhile` may ask for something else, once.
-    fn done(&mut self, request: &Value, meanwhile: impl Fn(&Value) -> Option<Value>) -> Got {
+    fn until_done(&mut self, request: &Value, meanwhile: impl Fn(&Value) -> Option<Value>) -> Got {
         let (mut got, mut interrupted) = (Got::default(), false);
         let mut frame = self.ask(request);
         loop {
@@ -87,9 +98,20 @@ impl Page {
         }
     }
 
-    fn work(&mut self, work: Value) -> Got {
-        self.done(&json!({"do": "work", "work": work}), |_| None)
+    /// Has the probe do something, which must succeed.
+    fn work(&mut self, wanted: Value) -> Got {
+        self.asked(wanted, |_| None)
     }
+
+    fn asked(&mut self, wanted: Value, answer: impl Fn(&Value) -> Option<Value>) -> Got {
+        let got = self.until_done(&work(wanted), answer);
+        assert_eq!(got.failed, None, "{}", got.said);
+        got
+    }
+}
+
+fn work(work: Value) -> Value {
+    json!({"do": "work", "work": work})
 }
 
 fn bytes(file: &Value) -> Vec<u8> {
@@ -104,283 +126,56 @@ fn identify(seed: u32) -> Value {
 /// Lines that do not count what was done before.
 fn lasting(said: &str) -> Vec<&str> {
     let counts = ["acquisition", "link", "skin"];
-    said.lines()
-        .filter(|line| !counts.iter().any(|name| line.starts_with(name)))
-        .collect()
+    let is_count = |line: &&str| counts.iter().any(|name| line.starts_with(name));
+    said.lines().filter(|line| !is_count(line)).collect()
+}
+
+/// Answers each question that has these words.
+fn answer(words: &'static str, answer: Value) -> impl Fn(&Value) -> Option<Value> {
+    move |frame| {
+        let asked = frame["question"]["asked"].as_str()?;
+        assert_says(asked, &[words]);
+        Some(answer.clone())
+    }
+}
+
+fn yes() -> Value {
+    json!({"do": "answer", "yes": true})
+}
+
+fn no() -> Value {
+    json!({"do": "answer", "yes": false})
 }
 
 #[test]
 fn a_page_says_what_the_command_says() {
-    let (at, _) = probe(1000);
-    let status = printed(&["status", "--port", &at]);
-    let (mut page, got) = Page::new(&at);
+    let bench = Bench::new(1000);
+    let status = bench.printed("status");
+    let (mut page, got) = Page::new(&bench.port);
     assert_eq!(got.failed, None);
     assert_eq!(lasting(&got.said), lasting(&status));
-    assert_eq!(got.known["textures"].as_array().unwrap().len(), 3);
-
+    assert_eq!(array(&got.known["textures"]).len(), 3);
     let found = page.work(identify(7));
-    assert_eq!(found.failed, None, "{}", found.said);
-    let verdicts: Vec<&Value> = found
-        .happened
-        .iter()
-        .filter(|one| one["what"] == "verdict")
-        .collect();
-    assert_eq!(verdicts.len(), 1, "{}", found.said);
-    let slides = found.happened.iter().filter(|one| one["what"] == "slide");
-    assert!(slides.clone().count() > 0);
-    for slide in slides {
-        assert!(slide["place"].is_array(), "{slide}");
-    }
-    // the log that the page keeps is one of the command's, which decides the same again
+    let of = |what: &'static str| found.happened.iter().filter(move |one| one["what"] == what);
+    assert_eq!(of("verdict").count(), 1, "{}", found.said);
+    assert!(of("slide").count() > 0 && of("slide").all(|slide| slide["place"].is_array()));
+    // the log that the page keeps is one of the command's, which decides the same again and says it in the same words
     let log = page.ask(&json!({"do": "log"}));
-    let temp = tempfile::tempdir().unwrap();
-    let file = temp.path().join("session.jsonl");
-    fs::write(&file, bytes(&log["files"][0])).unwrap();
-    printed(&["log", "replay", path(&file)]);
-    // and shows the same words
-    let shown = printed(&["log", "show", path(&file)]);
-    let answer = found
-        .said
-        .lines()
-        .rfind(|line| line.starts_with("It is") && line.contains("after"));
-    let answer = answer.unwrap_or_else(|| panic!("{}", found.said));
-    assert!(shown.contains(answer), "{shown}\n{}", found.said);
-    // heard again it is the same
-    page.remote.give(fs::read(&file).unwrap());
-    let again = page.ask(&json!({"do": "open", "files": ["session.jsonl"]}));
-    let told = |happened: &[Value]| -> Vec<Value> {
-        let of = |one: &&Value| one["what"] != "done";
-        happened.iter().filter(of).cloned().collect()
-    };
-    assert_eq!(
-        told(again["happened"].as_array().unwrap()),
-        told(&found.happened)
-    );
-}
-
-#[test]
-fn a_page_teaches_verifies_and_records() {
-    let (at, _) = probe(1000);
-    let (mut page, _) = Page::new(&at);
-    page.work(identify(3));
-    let taught = page.work(json!({"do": "teach", "name": "mine"}));
-    assert_eq!(taught.failed, None);
-    assert_says(&taught.said, &["The probe has learned mine from"]);
-    let names = taught.known["textures"].as_array().unwrap();
-    assert!(names.contains(&json!("mine")), "{names:?}");
-    let verified = page.work(
-        json!({"do": "verify", "name": "mine", "threshold": 0.99, "max_slides": 3, "seed": 5}),
-    );
-    assert_eq!(verified.failed, None, "{}", verified.said);
-    assert_says(
-        &verified.said,
-        &["Is it mine?", "slide 1,", "At this limit"],
-    );
-    // in the log it is judged again, and converted it says the same
-    let log = page.ask(&json!({"do": "log"}));
-    let temp = tempfile::tempdir().unwrap();
-    let [file, converted] = ["session.jsonl", "session.mcap"].map(|name| temp.path().join(name));
-    fs::write(&file, bytes(&log["files"][0])).unwrap();
-    let mut convert = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    let convert = convert.args(["convert", path(&file), "--mcap", path(&converted)]);
-    assert!(convert.output().unwrap().status.success());
-    for file in [file, converted] {
-        page.remote.give(fs::read(&file).unwrap());
-        let again = page.ask(&json!({"do": "open", "files": [file.file_name().unwrap().to_str()]}));
-        let happened = again["happened"]
-            .as_array()
-            .unwrap_or_else(|| panic!("{again}"));
-        let of = |what: &str| -> Vec<&str> {
-            let all = happened.iter().filter(|one| one["what"] == what);
-            all.map(|one| one["said"].as_str().unwrap()).collect()
-        };
-        for said in [of("judged"), of("verified")].concat() {
-            assert!(verified.said.contains(said), "{said}\n{}", verified.said);
-        }
-        let slides = verified.said.matches("  slide ").count();
-        assert_eq!((of("judged").len(), of("verified").len()), (slides, 1));
-    }
-
-    let trained = page.work(json!({"do": "train", "name": "mine too", "trials": 1, "seed": 1}));
-    assert_eq!(trained.failed, None, "{}", trained.said);
-    assert_says(&trained.said, &["trial 1 of", "mine too: 3 slides made."]);
-
-    let recorded = page.work(json!({"do": "record", "name": "Mine", "slides": 3, "seed": 2}));
-    assert_eq!(recorded.failed, None, "{}", recorded.said);
-    let temp = tempfile::tempdir().unwrap();
-    for file in recorded.folders[0]["files"].as_array().unwrap() {
-        let name = file["name"].as_str().unwrap();
-        fs::write(temp.path().join(name), bytes(file)).unwrap();
-    }
-    let set = tactus_lab::data::recordings::RecordingSet::open(temp.path()).unwrap();
-    assert_eq!(set.names(), ["Mine"]);
-    assert_eq!(set.load_texture(0).unwrap().len(), 3);
-}
-
-#[test]
-fn a_page_keeps_a_table_before_it_is_replaced() {
-    let (at, _) = probe(1000);
-    let (mut page, _) = Page::new(&at);
-    let pulled = page.work(json!({"do": "pull"}));
-    let factory = bytes(&pulled.files[0]);
-    assert_eq!(factory, known().1);
-    page.work(identify(3));
-    page.work(json!({"do": "teach", "name": "mine"}));
-    let learned = bytes(&page.work(json!({"do": "pull"})).files[0]);
-    let push = json!({"do": "work", "work": {"do": "push", "file": "old.tact", "bytes": factory}});
-    let answer = |yes: bool| {
-        move |frame: &Value| {
-            frame["question"]
-                .is_object()
-                .then(|| json!({"do": "answer", "yes": yes}))
-        }
-    };
-    let kept = page.done(&push, answer(false));
-    assert_eq!(kept.failed.as_deref(), Some("nothing was changed"));
-    assert_eq!(bytes(&kept.files[0]), learned);
-    assert_says(&kept.said, &["No longer known: mine."]);
-    let pushed = page.done(&push, answer(true));
-    assert_eq!(pushed.failed, None);
-    assert_says(
-        &pushed.said,
-        &["old.tact: the probe uses it now: 3 textures"],
-    );
-    let mut damaged = factory.clone();
-    damaged[40] ^= 1;
-    let refused = page.work(json!({"do": "push", "file": "bad.tact", "bytes": damaged}));
-    assert!(refused.failed.unwrap().starts_with("bad.tact: "));
-}
-
-#[test]
-fn a_page_asks_to_move_the_sample_where_the_command_does() {
-    let (at, _) = probe(1000);
-    let (mut page, _) = Page::new(&at);
-    let sentence =
-        "Move or turn Mine under the finger, so that the next slide is on another track.";
-    let answers = |answer: Value| {
-        move |frame: &Value| {
-            let question = frame["question"].as_object()?;
-            assert_eq!(question["asked"], sentence);
-            assert_eq!(question["yes"], "It is moved");
-            Some(answer.clone())
-        }
-    };
-    // of a new texture, before the second trial alone
-    let train =
-        json!({"do": "work", "work": {"do": "train", "name": "Mine", "trials": 2, "seed": 1}});
-    let trained = page.done(&train, answers(json!({"do": "answer", "yes": true})));
-    assert_eq!(trained.failed, None, "{}", trained.said);
-    assert_says(
-        &trained.said,
-        &[
-            "Mine: 6 slides made.",
-            "Its sample was moved between trials.",
-        ],
-    );
-    // of one with trials, before the first
-    let again =
-        json!({"do": "work", "work": {"do": "train", "name": "Mine", "trials": 3, "seed": 2}});
-    let stopped = page.done(&again, answers(json!({"do": "stop"})));
-    assert_eq!(
-        stopped.failed.as_deref(),
-        Some("stopped: the finger is lifted and the stage stands")
-    );
-    let known =
-        page.work(json!({"do": "train", "name": "Mine", "trials": 3, "moved": false, "seed": 2}));
-    assert_eq!(known.failed, None, "{}", known.said);
-    assert_says(&known.said, &["Mine: 3 slides made."]);
-
-    let record =
-        json!({"do": "work", "work": {"do": "record", "name": "Mine", "slides": 4, "seed": 2}});
-    let recorded = page.done(&record, answers(json!({"do": "answer", "yes": false})));
-    assert_eq!(recorded.failed, None, "{}", recorded.said);
-    let manifest = recorded.folders[0]["files"].as_array().unwrap().last();
-    let manifest = String::from_utf8(bytes(manifest.unwrap())).unwrap();
-    let of_slide = |row: &str| row.rsplit(',').nth(4).unwrap().to_owned();
-    let moved: Vec<String> = manifest.lines().skip(1).map(of_slide).collect();
-    assert_eq!(moved, ["no"; 4], "{manifest}");
-}
-
-#[test]
-fn a_page_changes_what_a_probe_knows_and_keeps_as_the_command_does() {
-    let (at, _) = probe(1000);
-    let (mut page, _) = Page::new(&at);
-    let factory = bytes(&page.work(json!({"do": "pull"})).files[0]);
-    let first = Table::read(&factory).unwrap().name(0).unwrap().to_owned();
-    let answer = |yes: bool| {
-        move |frame: &Value| {
-            let asked = frame["question"]["asked"].as_str()?;
-            assert!(asked.ends_with("\nGo on?"), "{asked}");
-            Some(json!({"do": "answer", "yes": yes}))
-        }
-    };
-    let work = |work: Value| json!({"do": "work", "work": work});
-
-    let renamed = page.work(json!({"do": "rename", "from": first, "to": "renamed"}));
-    assert_eq!(renamed.failed, None);
-    assert_says(&renamed.said, &[&format!("{first} is renamed now.")]);
-    assert!(
-        renamed.known["textures"]
-            .as_array()
-            .unwrap()
-            .contains(&json!("renamed"))
-    );
-    let before = bytes(&page.work(json!({"do": "pull"})).files[0]);
-
-    let forget = work(json!({"do": "forget", "name": "renamed"}));
-    let kept = page.done(&forget, answer(false));
-    assert_eq!(kept.failed.as_deref(), Some("nothing was changed"));
-    assert_eq!(bytes(&kept.files[0]), before);
-    let forgotten = page.done(&forget, answer(true));
-    assert_eq!(forgotten.failed, None);
-    assert_says(
-        &forgotten.said,
-        &[
-            "The probe is to forget renamed.",
-            "The probe's table is kept: table-",
-            "The probe has forgotten renamed.",
-        ],
-    );
-    assert_eq!(bytes(&forgotten.files[0]), before);
-    assert_eq!(forgotten.known["textures"].as_array().unwrap().len(), 2);
-    let nothing = page.done(&work(json!({"do": "forget-self-learned"})), answer(true));
-    assert_says(
-        &nothing.said,
-        &["The probe is to forget what it learned by itself."],
-    );
-    let nobody = page.done(
-        &work(json!({"do": "forget-training", "name": "nothing"})),
-        answer(true),
-    );
-    assert_eq!(nobody.failed, None);
-    assert_says(
-        &nobody.said,
-        &["The probe has forgotten the training of nothing."],
-    );
-
-    let back = page.done(&work(json!({"do": "factory"})), answer(true));
-    assert_eq!(back.failed, None);
-    assert_says(
-        &back.said,
-        &["The probe uses the firmware's own table: 3 textures"],
-    );
-    assert_eq!(bytes(&page.work(json!({"do": "pull"})).files[0]), factory);
-    // there is nothing to lose, and no question
-    assert_eq!(page.work(json!({"do": "factory"})).files.len(), 0);
-
-    // the same words as the command's
-    let alarm = page.work(json!({"do": "false-alarm", "share": 0.005}));
+    bench.at.write("log", bytes(&log["files"][0]));
+    let replayed = bench.at.printed("device log log");
+    let answers = found.said.lines().filter(|line| line.starts_with("It is"));
+    let last = answers
+        .clone()
+        .rfind(|line| line.contains("after"))
+        .expect(&found.said);
+    assert_says(&replayed, &[last.split(" after ").next().unwrap()]);
     drop(page);
-    let printed = printed(&["settings", "--port", &at]);
-    assert_eq!(alarm.said, printed);
-    assert_says(&printed, &["for 0.5 % false alarms, as set"]);
-    let (mut page, _) = Page::new(&at);
-    let high = page.done(&work(json!({"do": "high-force", "on": true})), |frame| {
-        let asked = frame["question"]["asked"].as_str()?;
-        assert!(asked.contains("a mount whose spring yields"), "{asked}");
-        Some(json!({"do": "answer", "yes": true}))
-    });
-    assert_eq!(high.failed, None);
+    // the same words of settings, too
+    let (mut page, _) = Page::new(&bench.port);
+    let alarm = page.work(json!({"do": "false-alarm", "share": 0.005}));
+    assert_says(&alarm.said, &["for 0.5 % false alarms, as set"]);
+    let high = json!({"do": "high-force", "on": true});
+    let high = page.asked(high, answer("a mount whose spring yields", yes()));
     assert_says(&high.said, &["up to 2.00 N, as set"]);
     let low = page.work(json!({"do": "high-force", "on": false}));
     assert_says(&low.said, &["up to 1.26 N"]);
@@ -389,45 +184,153 @@ fn a_page_changes_what_a_probe_knows_and_keeps_as_the_command_does() {
 }
 
 #[test]
-fn a_page_stops_a_probe_and_is_told_when_nobody_answers() {
-    let (at, _) = probe(20);
-    let (mut page, _) = Page::new(&at);
-    let stopped = page.done(&json!({"do": "work", "work": identify(1)}), |frame| {
-        (frame["phase"] == "Sliding").then(|| json!({"do": "stop"}))
-    });
-    assert_eq!(
-        stopped.failed.as_deref(),
-        Some("stopped: the finger is lifted and the stage stands")
+fn a_page_teaches_verifies_trains_and_records() {
+    let bench = Bench::new(1000);
+    let (mut page, _) = Page::new(&bench.port);
+    page.work(identify(3));
+    let taught = page.work(json!({"do": "teach", "name": "mine"}));
+    assert_says(&taught.said, &["The probe has learned mine from"]);
+    assert!(
+        array(&taught.known["textures"]).contains(&json!("mine")),
+        "{}",
+        taught.known
     );
-    let error = page.ask(&json!({"do": "dance"}));
-    assert!(error["why"].as_str().unwrap().starts_with("no request"));
+    let verify =
+        json!({"do": "verify", "name": "mine", "threshold": 0.99, "max_slides": 3, "seed": 5});
+    let verified = page.work(verify);
+    assert_says(
+        &verified.said,
+        &["Is it mine?", "slide 1,", "At this limit"],
+    );
+    // of a new texture it asks to move the sample before the second trial alone
+    let moves = "Move or turn Mine under the finger, so that the next slide is on another track.";
+    let train = |trials: u8| json!({"do": "train", "name": "Mine", "trials": trials, "seed": 1});
+    let trained = page.asked(train(2), answer(moves, yes()));
+    assert_says(
+        &trained.said,
+        &[
+            "Mine: 6 slides made.",
+            "Its sample was moved between trials.",
+        ],
+    );
+    // of one with trials, before the first
+    let stopped = page.until_done(&work(train(3)), answer(moves, json!({"do": "stop"})));
+    assert_eq!(stopped.failed.as_deref(), Some(STOPPED));
+    let mut same_spot = train(3);
+    same_spot["moved"] = false.into();
+    assert_says(&page.work(same_spot).said, &["Mine: 3 slides made."]);
 
-    let nobody = line(|mut stream| {
-        let _ = stream.read(&mut [0; 1]);
-        thread::sleep(Duration::from_secs(30));
-    });
-    let (_, silent) = Page::new(&nobody);
-    let failed = silent.failed.unwrap();
-    assert!(failed.contains("the probe said nothing for"), "{failed}");
-    let noise = line(|mut stream| {
-        let _ = stream.write_all(&[0x55; 4000]);
-        thread::sleep(Duration::from_secs(30));
-    });
-    let (mut page, garbage) = Page::new(&noise);
-    let failed = garbage.failed.unwrap();
-    assert!(failed.contains("and not one report"), "{failed}");
-    let error = page.ask(&json!({"do": "work", "work": {"do": "status"}}));
-    assert_eq!(error["why"], "no probe is connected");
+    let record = json!({"do": "record", "name": "Mine", "slides": 4, "seed": 2});
+    let recorded = page.asked(record, answer(moves, no()));
+    let folder = tempfile::tempdir().unwrap();
+    for file in array(&recorded.folders[0]["files"]) {
+        fs::write(
+            folder.path().join(file["name"].as_str().unwrap()),
+            bytes(file),
+        )
+        .unwrap();
+    }
+    let set = RecordingSet::open(folder.path()).unwrap();
+    assert_eq!(set.names(), ["Mine"]);
+    assert_eq!(set.load_texture(0).unwrap().len(), 4);
+    let manifest = fs::read_to_string(folder.path().join("manifest.csv")).unwrap();
+    let moved = manifest
+        .lines()
+        .skip(1)
+        .map(|row| row.rsplit(',').nth(4).unwrap());
+    assert!(moved.eq(["no"; 4]), "{manifest}");
 }
 
-/// With TACTUS_PAGE_PORT, `cargo xtask test --step page` has a page speak to this probe: the address goes to that file, and the
-/// probe lives until standard input ends.
+#[test]
+fn a_page_changes_what_a_probe_knows_and_keeps_a_copy() {
+    let bench = Bench::new(1000);
+    let (mut page, _) = Page::new(&bench.port);
+    let pull = |page: &mut Page| bytes(&page.work(json!({"do": "pull"})).files[0]);
+    let factory = pull(&mut page);
+    assert_eq!(factory, known().1);
+    let first = Table::read(&factory).unwrap().name(0).unwrap().to_owned();
+    let renamed = page.work(json!({"do": "rename", "from": first, "to": "renamed"}));
+    assert_says(&renamed.said, &[&format!("{first} is renamed now.")]);
+    assert!(array(&renamed.known["textures"]).contains(&json!("renamed")));
+    let before = pull(&mut page);
+
+    const ASK: &str = "\nGo on?";
+    let forget = json!({"do": "forget", "name": "renamed"});
+    let kept = page.until_done(&work(forget.clone()), answer(ASK, no()));
+    assert_eq!(kept.failed.as_deref(), Some("nothing was changed"));
+    assert_eq!(bytes(&kept.files[0]), before);
+    let forgotten = page.asked(forget, answer(ASK, yes()));
+    let said = [
+        "The probe is to forget renamed.",
+        "The probe's table is kept: table-",
+    ];
+    assert_says(&forgotten.said, &said);
+    assert_says(&forgotten.said, &["The probe has forgotten renamed."]);
+    assert_eq!(bytes(&forgotten.files[0]), before);
+    assert_eq!(array(&forgotten.known["textures"]).len(), 2);
+    for (request, said) in [
+        (
+            json!({"do": "forget-self-learned"}),
+            "The probe is to forget what it learned by itself.",
+        ),
+        (
+            json!({"do": "forget-training", "name": "x"}),
+            "The probe has forgotten the training of x.",
+        ),
+        (
+            json!({"do": "push", "file": "old.tact", "bytes": before}),
+            "old.tact: the probe uses it now: 3 textures",
+        ),
+        (
+            json!({"do": "factory"}),
+            "The probe uses the firmware's own table: 3 textures",
+        ),
+    ] {
+        assert_says(&page.asked(request, answer(ASK, yes())).said, &[said]);
+    }
+    assert_eq!(pull(&mut page), factory);
+    // there is nothing to lose, and no question
+    assert_eq!(page.work(json!({"do": "factory"})).files.len(), 0);
+    let mut damaged = factory;
+    damaged[40] ^= 1;
+    let push = json!({"do": "push", "file": "bad.tact", "bytes": damaged});
+    let refused = page.until_done(&work(push), |_| None);
+    assert!(refused.failed.unwrap().starts_with("bad.tact: "));
+}
+
+#[test]
+fn a_page_stops_a_probe_and_is_told_when_nobody_answers() {
+    let bench = Bench::new(20);
+    let (mut page, _) = Page::new(&bench.port);
+    let stop = |frame: &Value| (frame["phase"] == "Sliding").then(|| json!({"do": "stop"}));
+    let stopped = page.until_done(&work(identify(1)), stop);
+    assert_eq!(stopped.failed.as_deref(), Some(STOPPED));
+    let error = page.ask(&json!({"do": "dance"}));
+    assert!(error["why"].as_str().unwrap().starts_with("no request"));
+    for (greeting, why) in [
+        (0, "the probe said nothing for"),
+        (4000, "and not one report"),
+    ] {
+        let nobody = line(move |mut stream| {
+            let _ = stream.write_all(&vec![0x55; greeting]);
+            let _ = stream.read(&mut [0; 1]);
+            thread::sleep(Duration::from_secs(30));
+        });
+        let (mut page, got) = Page::new(&nobody);
+        assert_says(&got.failed.unwrap(), &[why]);
+        let error = page.ask(&work(json!({"do": "status"})));
+        assert_eq!(error["why"], "no probe is connected");
+    }
+}
+
+/// With TACTUS_PAGE_PORT, `cargo xtask test --step page` has a page speak to this probe: the address goes to that file,
+/// and the probe lives until standard input ends.
 #[test]
 fn serves_a_page() {
     let Some(file) = std::env::var_os("TACTUS_PAGE_PORT") else {
         return;
     };
-    let (at, _) = probe(40);
-    fs::write(file, at.trim_start_matches("tcp:")).unwrap();
+    let bench = Bench::new(40);
+    fs::write(file, bench.port.trim_start_matches("tcp:")).unwrap();
     let _ = std::io::stdin().read_to_end(&mut Vec::new());
 }

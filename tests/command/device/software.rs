@@ -1,6 +1,89 @@
 //! A probe in software: the simulated rig under the core's own probe behind the frames of the link.
 
-use super::*;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::sync::mpsc::{self, Receiver as Told, Sender};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tactus_core::dsp::Plan;
+use tactus_core::explorer::Method;
+use tactus_core::probe::seams::{Panel, RigHandle as _};
+use tactus_core::probe::{RigState, TableInUse, Turn, Watch, receive};
+use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::skin::SkinCare;
+use tactus_core::sensor::FingerCode;
+use tactus_core::wire::{self, Counts, Event, MAX_FRAME, Receiver, Report, Request};
+use tactus_lab::sim::collection::{Collection, calibrated};
+use tactus_lab::sim::flash::{RamFlash, TABLE};
+use tactus_lab::sim::probe::{self, Host};
+use tactus_lab::sim::rig::SimRig;
+
+use crate::Scratch;
+
+/// A probe in software, the commands that it gets, and a folder for commands at its port.
+pub(super) struct Bench {
+    pub(super) at: Scratch,
+    pub(super) port: String,
+    asked: Told<wire::Command>,
+}
+
+impl Bench {
+    /// The probe makes so many ms of its time between two looks at the line.
+    pub(super) fn new(hurry: u64) -> Self {
+        // before anybody waits for it
+        known();
+        let (to, asked) = mpsc::channel();
+        let (listener, port) = listen();
+        thread::spawn(move || {
+            let streams = listener.incoming().map(|stream| {
+                let stream = stream.unwrap();
+                let wait = Some(Duration::from_millis(1));
+                stream.set_read_timeout(wait).unwrap();
+                Box::new(stream) as Box<dyn Line>
+            });
+            serve(streams, hurry, to);
+        });
+        let at = Scratch::new().with("PORT", &port);
+        Self { at, port, asked }
+    }
+
+    fn line(line: &str) -> String {
+        format!("device {line} --port PORT")
+    }
+
+    pub(super) fn command(&self, line: &str) -> Command {
+        self.at.command(&Self::line(line))
+    }
+
+    pub(super) fn printed(&self, line: &str) -> String {
+        self.at.printed(&Self::line(line))
+    }
+
+    pub(super) fn json(&self, line: &str, code: i32) -> Value {
+        self.at.json(&Self::line(line), code)
+    }
+
+    pub(super) fn error(&self, line: &str) -> String {
+        self.at.error(&Self::line(line), 1)
+    }
+
+    /// What came since this was asked for last.
+    pub(super) fn asked(&self) -> Vec<wire::Command> {
+        self.asked.try_iter().collect()
+    }
+
+    pub(super) fn wait_for(&self, is: impl Fn(&wire::Command) -> bool) {
+        let until = Instant::now() + Duration::from_secs(60);
+        let left = || until.saturating_duration_since(Instant::now());
+        while !is(&self.asked.recv_timeout(left()).expect("never asked")) {}
+    }
+}
 
 pub(super) const UNKNOWN: u8 = 47;
 
@@ -204,25 +287,7 @@ pub(super) fn serve(
     }
 }
 
-/// A probe on a TCP port of its own: its address, and the commands that it gets.
-pub(super) fn probe(hurry: u64) -> (String, Told<wire::Command>) {
-    // before anybody waits for it
-    known();
-    let (asked, told) = mpsc::channel();
-    let (listener, at) = listen();
-    thread::spawn(move || {
-        let streams = listener.incoming().map(|stream| {
-            let stream = stream.unwrap();
-            let wait = Some(Duration::from_millis(1));
-            stream.set_read_timeout(wait).unwrap();
-            Box::new(stream) as Box<dyn Line>
-        });
-        serve(streams, hurry, asked);
-    });
-    (at, told)
-}
-
-pub(super) fn listen() -> (TcpListener, String) {
+fn listen() -> (TcpListener, String) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let at = format!("tcp:{}", listener.local_addr().unwrap());
     (listener, at)

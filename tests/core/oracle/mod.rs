@@ -1,7 +1,7 @@
 //! The fused way to decide, in f64 and straight from the recipe: what the fixed-point one is held against.
 //!
-//! Written without a look at any other implementation. K textures, M movements, d features: any number of each. Where the
-//! recipe leaves something open, the reading taken here is marked "reading:".
+//! Written without a look at any other implementation. K textures, M movements, d features: any number of each. Where
+//! the recipe leaves something open, the reading taken here is marked "reading:".
 #![allow(unreachable_pub)]
 #![allow(clippy::needless_range_loop)] // indices as in the formulas
 

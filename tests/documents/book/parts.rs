@@ -128,7 +128,23 @@ pub(super) fn doc(attributes: &[syn::Attribute]) -> String {
             _ => None,
         }
     });
-    plain(&lines.collect::<Vec<_>>().join(" "))
+    let lines = lines.collect::<Vec<_>>();
+    match lines.is_empty() {
+        true => error_text(attributes).unwrap_or_default(),
+        false => plain(&lines.join(" ")),
+    }
+}
+
+/// The text of an error: it says what there is no comment for.
+fn error_text(attributes: &[syn::Attribute]) -> Option<String> {
+    use quote::ToTokens as _;
+    let mut attributes = attributes.iter();
+    let error = attributes.find(|attribute| attribute.path().is_ident("error"))?;
+    let mut tokens = error.meta.require_list().ok()?.tokens.clone().into_iter();
+    tokens.find_map(|token| {
+        let text: syn::LitStr = syn::parse2(token.into_token_stream()).ok()?;
+        Some(text.value())
+    })
 }
 
 /// A type as it is written, without generic noise and in one line of a table.

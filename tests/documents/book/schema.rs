@@ -1,7 +1,7 @@
 //! The messages of the link for programs: `docs/src/wire.json`, made from the sources as the page is.
 //!
-//! A type is the name of a number, of a type in `types`, or one of these: `{"seq": T}`, `{"option": T}`, `{"tuple": [T, ...]}`,
-//! `{"array": T, "length": N}`, `{"enum": [VARIANT, ...]}`, `{"struct": [FIELD, ...]}`.
+//! A type is the name of a number, of a type in `types`, or one of these: `{"seq": T}`, `{"option": T}`,
+//! `{"tuple": [T, ...]}`, `{"array": T, "length": N}`, `{"enum": [VARIANT, ...]}`, `{"struct": [FIELD, ...]}`.
 
 use std::collections::BTreeMap;
 

@@ -71,7 +71,7 @@ pub fn images() -> &'static [Vec<u8>] {
                     if let Some(table) = tables().get(usize::from(fill)) {
                         store.begin_table(table.len()).await.expect("room");
                         store.write_table(0, table).await.expect("in order");
-                        store.commit_table(&mut buffer).await.expect("whole");
+                        store.commit_table(None, &mut buffer).await.expect("whole");
                     }
                     for date in 0..10 * u32::from(fill) {
                         let calibration = RigCalibration {

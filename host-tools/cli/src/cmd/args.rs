@@ -1,5 +1,6 @@
 //! Arguments that several commands take.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -8,8 +9,12 @@ use tactus_core::features::FeatureSet;
 use tactus_core::table::{Drift, MAX_LENGTHS, is_false_alarm};
 use tactus_lab::eval::evaluate::Method;
 
-use super::environment;
 use super::output::UsageError;
+
+/// The value of a variable of the environment, unless it is empty.
+pub(crate) fn named(variable: &str) -> Option<OsString> {
+    std::env::var_os(variable).filter(|value| !value.is_empty())
+}
 
 #[derive(Args, Clone)]
 pub(crate) struct Recordings {
@@ -20,12 +25,9 @@ pub(crate) struct Recordings {
 
 impl Recordings {
     /// The folder that was given, or that the environment names.
-    ///
-    /// # Errors
-    /// Neither does.
     pub(crate) fn folder(&self) -> Result<PathBuf, UsageError> {
         let folder = self.recordings.clone();
-        folder.or_else(environment::recordings).ok_or_else(|| {
+        folder.or_else(|| named("TACTUS_RECORDINGS").map(PathBuf::from)).ok_or_else(|| {
             let say = "give a folder of recordings: --recordings DIR, or TACTUS_RECORDINGS in the environment";
             UsageError(say.to_owned())
         })
@@ -48,9 +50,9 @@ pub(crate) struct Stop {
 /// What a fused table that is learned expects.
 #[derive(Args, Clone)]
 pub(crate) struct Expecting {
-    /// How much fingers and samples change from one session to the next, for a table that is learned with the method fused:
-    /// standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and samples that
-    /// stay where they are
+    /// How much fingers and samples change from one session to the next, for a table that is learned with the method
+    /// fused: standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and
+    /// samples that stay where they are
     #[arg(long, value_name = "BANDS,TRACTION|0", default_value = "0.1,0.04", value_parser = drift)]
     pub(crate) drift: Drift,
 }
@@ -70,10 +72,6 @@ fn drift(text: &str) -> Result<Drift, String> {
     })
 }
 
-/// Lengths as a table has them.
-///
-/// # Errors
-/// They are too many, or one is not longer than the one before.
 pub(crate) fn rising(lengths_ms: &[u16]) -> Result<Vec<u16>, UsageError> {
     if lengths_ms.len() > MAX_LENGTHS || !lengths_ms.is_sorted_by(|a, b| a < b) {
         let say = format!("--lengths: at most {MAX_LENGTHS}, the shortest first, such as 1,2,3");
@@ -82,7 +80,6 @@ pub(crate) fn rising(lengths_ms: &[u16]) -> Result<Vec<u16>, UsageError> {
     Ok(lengths_ms.to_vec())
 }
 
-/// A length in s, as ms.
 pub(crate) fn length(text: &str) -> Result<u16, String> {
     match text.trim().parse::<f64>() {
         Ok(s) if (0.3..=60.0).contains(&s) => Ok((s * 1e3).round() as u16),

@@ -5,19 +5,12 @@ mod bringup;
 mod calibrate;
 mod doctor;
 mod flash;
-mod history;
 mod identify;
 mod line;
-mod listen;
-pub(crate) mod log;
-mod loss;
+mod log;
 mod monitor;
 mod record;
-mod refresh;
 mod rename;
-mod replay;
-mod samples;
-mod settings;
 mod status;
 mod table;
 mod train;
@@ -27,42 +20,30 @@ use std::io::Write;
 
 use clap::Subcommand;
 
-use crate::cmd::output::{Done, Format};
+use crate::cmd::output::Done;
 
 pub(crate) use bench::BenchError;
 
-/// Work with a probe at its serial port, or with the emulated board
+/// Work with a probe at its serial port, or with an emulated board at a TCP port
 #[derive(Subcommand)]
 #[command(after_help = "\
 Try first:
-  tactus device list                           the serial ports, and which of them is a board
-  tactus device monitor --emulated             the emulated board, live (cargo xtask emulate builds it)
+  tactus device monitor                        what it measures, live
   tactus device status                         the state of the probe that is plugged in
   tactus device doctor                         whether all is well with it, and what to do if not
   tactus device identify --log session.jsonl   what lies under its finger
-  tactus device log replay session.jsonl       the same decisions, computed again on this PC
+  tactus device log session.jsonl              the same decisions, computed again on this PC
 
 Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.
 Where `identify` ends without a name that is sure, or `verify` not with \"the same\", it is 3.")]
 pub(crate) enum Command {
-    /// List the serial ports, boards first
-    #[command(after_help = "\
-Examples:
-  tactus device list
-  tactus device list --format json
-  tactus device status --port PORT    one of those listed")]
-    List {
-        /// How to print them
-        #[arg(long, value_enum, default_value_t = Format::Text)]
-        format: Format,
-    },
     Status(status::Args),
     Doctor(doctor::Args),
     /// Watch the probe live, and have it identify, home or stop by a key
     #[command(after_help = "\
 Examples:
   tactus device monitor
-  tactus device monitor --emulated --texture burlap    the emulated board, over simulated burlap")]
+  tactus device monitor --port localhost:7429    the emulated board of `cargo xtask emulate --port 7429`")]
     Monitor(identify::Args),
     Identify(identify::Run),
     Verify(verify::Args),
@@ -70,12 +51,12 @@ Examples:
     Teach(train::Teach),
     Rename(rename::Rename),
     Forget(rename::Forget),
-    Refresh(refresh::Args),
+    Refresh(rename::Refresh),
     Record(record::Args),
     #[command(subcommand)]
     Table(table::Command),
     Calibrate(calibrate::Args),
-    Settings(settings::Args),
+    Settings(rename::Settings),
     /// End a fault and find the limit switches
     #[command(after_help = "\
 Examples:
@@ -88,13 +69,11 @@ Examples:
     Stop(line::Where),
     Flash(flash::Args),
     Bringup(bringup::Args),
-    Log(replay::Args),
+    Log(log::Args),
 }
 
-/// Does what is asked for.
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Done> {
     let done = match command {
-        Command::List { format } => line::list(*format, out),
         Command::Status(args) => status::run(args, out),
         Command::Doctor(args) => doctor::run(args, out),
         Command::Monitor(args) => monitor::run(args),
@@ -104,16 +83,16 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Don
         Command::Teach(args) => train::teach(args, out),
         Command::Rename(args) => rename::rename(args, out),
         Command::Forget(args) => rename::forget(args, out),
-        Command::Refresh(args) => refresh::run(args, out),
+        Command::Refresh(args) => rename::refresh(args, out),
         Command::Record(args) => record::run(args, out),
         Command::Table(command) => table::run(command, out),
         Command::Calibrate(args) => calibrate::run(args, out),
-        Command::Settings(args) => settings::run(args, out),
+        Command::Settings(args) => rename::settings(args, out),
         Command::Home(at) => calibrate::home(at, out),
         Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),
         Command::Bringup(args) => bringup::run(args, out),
-        Command::Log(args) => replay::run(args, out),
+        Command::Log(args) => log::run(args, out),
     };
     done.map(|()| Done::Fully)
 }

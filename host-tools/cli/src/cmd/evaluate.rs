@@ -6,9 +6,8 @@ use anyhow::ensure;
 use clap::ValueEnum as _;
 use tactus_core::explorer;
 use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
-use tactus_lab::eval::experiment::Protocol;
 use tactus_lab::eval::show::count;
-use tactus_study::pictures::evaluation::figures;
+use tactus_study::pictures::evaluation::confusion;
 
 use super::output::{Format, percent, print_json, verdict_rows};
 use super::progress::with_progress;
@@ -18,27 +17,15 @@ mod experiment;
 mod novelty;
 mod verify;
 
-/// Plays the explorations that the arguments ask for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    if args.lifelong && args.protocol != Protocol::Drift {
-        // the first slides are learned from, all others come after them
-        let drift = Args {
-            protocol: Protocol::Drift,
-            ..args.clone()
-        };
-        return run(&drift, out);
-    }
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
-        is_fused || !args.lifelong && !args.verify && args.novelty.is_none(),
-        "--novelty, --verify and --lifelong need --method fused: the other methods do not recognise new textures"
+        is_fused || !args.verify && args.novelty.is_none(),
+        "--novelty and --verify need --method fused: the other methods do not recognise new textures"
     );
     let canvas = args.plot.open()?;
     let (experiment, protocol) = experiment::open(args)?;
     let config = args.stop.config(args.method);
-    if args.lifelong {
-        return novelty::lifelong(args, &experiment, config, out);
-    }
     if args.verify {
         return verify::run(args, &experiment, protocol, config, canvas, out);
     }
@@ -65,8 +52,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Format::Text => print_evaluation(&evaluation, out)?,
     }
     if let Some(canvas) = canvas {
-        let figures = figures(&courses, &names, args.stop.threshold)?;
-        canvas.write("tactus evaluate", &figures, out)?;
+        let figure = confusion(&courses, &names, args.stop.threshold)?;
+        canvas.write(&[figure], out)?;
     }
     Ok(())
 }

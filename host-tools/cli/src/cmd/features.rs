@@ -34,7 +34,6 @@ enum Rows {
     Text,
 }
 
-/// A slide, for programs.
 #[derive(Serialize)]
 struct SlideFeatures<'s> {
     material: u32,
@@ -50,7 +49,6 @@ struct SlideFeatures<'s> {
     ln_psd_bands: Vec<f32>,
 }
 
-/// Prints a row for every slide.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (set, measured) = measure_folder(&args.from.folder()?)?;
     // the number of the trial counts the slides of one texture and movement
@@ -146,7 +144,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A text as a field of a CSV table.
 fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))

@@ -9,7 +9,7 @@ use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{self, Config, Explorer, most_doubt};
+use tactus_core::explorer::{self, Config, Explorer};
 use tactus_core::features::Observation;
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
@@ -26,9 +26,9 @@ use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_lab::sim::rig::SimRig;
 use tactus_study::pictures::exploration::Exploration;
 
-use super::args::{Expecting, Recordings, Stop, length, rising};
+use super::args::{Expecting, Recordings, Stop};
 use super::learn::learned_here;
-use super::output::{Done, Format, UsageError, print_json};
+use super::output::{Done, Format, print_json};
 use super::plot::{Canvas, Plot};
 use super::progress::with_progress;
 use super::table_file::read_table;
@@ -42,9 +42,8 @@ With a folder of recordings, such as `tactus unpack` writes (there with --train-
   tactus identify --recordings DIR --material 91   a recorded texture is recognised from its slides
   tactus features --recordings DIR                 what every slide measures
   tactus evaluate --recordings DIR                 how often the answers are right, and how sure
-With a probe, or with the emulated board that `cargo xtask emulate` builds:
-  tactus device list                               which port it is at
-  tactus device monitor [--emulated]               what it measures, live
+With a probe, or with the emulated board of `cargo xtask emulate --port 7429`:
+  tactus device monitor                            what it measures, live
 
 Recordings of a real BioTac are at https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads
 them. `tactus simulate` makes others.";
@@ -57,8 +56,7 @@ Examples:
   tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
   tactus identify --recordings DIR --material 'bath towel'
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
-  tactus identify --simulated --early                         a slide ends when that is certain
-  tactus identify --simulated --plot burlap.svg               with pictures
+  tactus identify --simulated --plot pictures                 with pictures
 
 --plot draws how probable each texture was (posterior), and the unknown beside its two best
 candidates (spectrum).")]
@@ -77,12 +75,6 @@ pub(crate) struct Args {
     /// How many textures the simulated probe knows; the unknown one is among them
     #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
     among: u8,
-    /// End a slide of the simulated rig as soon as the verdict is certain
-    #[arg(long, requires = "simulated")]
-    early: bool,
-    /// With --early: the lengths at which a slide may end, s at constant speed
-    #[arg(long, value_name = "S,S,...", value_delimiter = ',', default_value = "0.5,1,2", requires = "early", value_parser = length)]
-    lengths: Vec<u16>,
     /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
@@ -106,7 +98,6 @@ pub(crate) struct Args {
     plot: Plot,
 }
 
-/// What `identify --format json` prints.
 #[derive(Serialize)]
 struct Identification {
     /// What was presented.
@@ -131,12 +122,8 @@ struct Identification {
     /// Work of sliding that wore the simulated skin, J.
     #[serde(skip_serializing_if = "Option::is_none")]
     skin_j: Option<f32>,
-    /// Seconds of sliding at constant speed, with slides that do not count.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sliding_s: Option<f64>,
 }
 
-/// Explores on recordings or on the simulated rig.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let canvas = args.plot.open()?;
     if args.simulated {
@@ -254,12 +241,12 @@ impl<'t> Presented<'t> {
     ) -> anyhow::Result<()> {
         let Some(canvas) = canvas else { return Ok(()) };
         let figures = self.exploration.figures(args.stop.threshold)?;
-        canvas.write("tactus identify", &figures, out)
+        canvas.write(&figures, out)
     }
 }
 
-/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text, shows
-/// every step.
+/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text,
+/// shows every step.
 fn explore_and_show<R>(
     rig: &mut R,
     presented: &mut Presented<'_>,
@@ -292,11 +279,6 @@ where
         |event| {
             slides.step(&event, table);
             presented.exploration.step(&event);
-            if let ExplorationStep::Chosen(action, expected) = &event {
-                let movement = table.movement(action.movement).map(|m| m.to_string());
-                let property = action.property.map(|p| p.to_string());
-                tracing::info!(movement, property, of = expected.len(), "chooses");
-            }
             match event {
                 // shown below: recordings that run out are no failure
                 ExplorationStep::CutShort(..) => {}
@@ -342,7 +324,6 @@ where
         verdict: Answer::new(verdict, explorer.slides(), table),
         rig_s: None,
         skin_j: None,
-        sliding_s: None,
     })
 }
 
@@ -353,7 +334,6 @@ struct Demonstration {
     args: Args,
 }
 
-/// What a newcomer sees first.
 pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(
         out,
@@ -387,17 +367,8 @@ fn identify_simulated(
     let calibration = calibrated(collection.setup(unknown, 0))?;
     let method = args.method.unwrap_or(Method::Fused).method();
     let textures = collection.textures.len() as u64;
-    let lengths_ms = rising(&args.lengths)?;
-    if args.early && most_doubt(method).is_none() {
-        let say = "--early is for the method fused: any other is wrong more often when it is asked more often";
-        return Err(UsageError(say.to_owned()).into());
-    }
     let bytes = with_progress(textures, "learning textures", |done| {
-        if args.early {
-            collection.learn_lengths(method, calibration, &lengths_ms, done)
-        } else {
-            collection.learn(method, calibration, done)
-        }
+        collection.learn(method, calibration, done)
     })?;
     let table = Table::read(&bytes)?;
     let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
@@ -416,12 +387,10 @@ fn identify_simulated(
     let mut presented = Presented::new(name, table);
     let found = explore_and_show(&mut rig, &mut presented, args, &mut random, never, out)?;
     let seconds = rig.now().as_secs_f64();
-    let sliding_s: f64 = rig.performed().iter().map(|made| made.steady_s).sum();
     let skin = rig.control().skin();
     let found = Identification {
         rig_s: Some(seconds),
         skin_j: Some(skin.energy_j()),
-        sliding_s: args.early.then_some(sliding_s),
         ..found
     };
     if is_text {
@@ -431,9 +400,6 @@ fn identify_simulated(
             skin.energy_j(),
             if skin.is_worn() { ", look at it" } else { "" }
         )?;
-        if args.early {
-            writeln!(out, "{sliding_s:.1} s of sliding at constant speed.")?;
-        }
     } else {
         print_json(&found, out)?;
     }

@@ -3,11 +3,9 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use serde::Serialize;
 use tactus_lab::data;
 use tactus_lab::eval::show::count;
 
-use super::output::{Format, print_json};
 use super::progress::progress;
 
 /// Convert recordings into the project's format (.npy files and a CSV manifest)
@@ -21,39 +19,16 @@ pub(crate) struct Args {
     from: PathBuf,
     /// The folder to write; it must not hold recordings yet
     to: PathBuf,
-    /// How to print what was written
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// What `import --format json` prints.
-#[derive(Serialize)]
-struct Imported {
-    folder: String,
-    textures: usize,
-    slides: usize,
-    /// Rows of 10 ms that are missing from the publisher's files.
-    lost_rows: usize,
-}
-
-/// Imports a folder into another.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let Args { from, to, format } = args;
+    let Args { from, to } = args;
     let bar = progress(0, "importing slides");
     let imported = data::import::import(from, to, &mut |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    if *format == Format::Json {
-        let imported = Imported {
-            folder: to.display().to_string(),
-            textures: imported.textures,
-            slides: imported.slides,
-            lost_rows: imported.lost_rows,
-        };
-        return print_json(&imported, out);
-    }
     let textures = count(imported.textures as u64, "texture");
     let slides = count(imported.slides as u64, "slide");
     writeln!(out, "{}: {textures}, {slides}", to.display())?;

@@ -5,7 +5,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail, ensure};
-use serde::Serialize;
 use tactus_core::explorer;
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerName;
@@ -19,9 +18,8 @@ use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::texture_name;
 
 use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
-use super::output::{Format, print_json};
 use super::progress::with_progress;
-use super::table_file::{TableFile, beside, write_table};
+use super::table_file::{beside, write_table};
 use super::textures::{collection, measure_folder};
 
 /// Learn a texture table from the first slides of every texture
@@ -36,7 +34,8 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
-    /// Slides to learn from, per texture and movement: the first ones of the session, or as many as there are, two at least
+    /// Slides to learn from, per texture and movement: the first ones of the session, or as many as there are, two at
+    /// least
     #[arg(long, value_name = "N", default_value_t = 5)]
     train_slides: usize,
     /// The way of deciding that the table is for: fused, or the others, which share one kind of table
@@ -50,40 +49,13 @@ pub(crate) struct Args {
     /// Share of the known textures that may be taken for new ones, unless `identify` says otherwise
     #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
     false_alarm: f32,
-    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end early
-    /// then. The image tactus-rig takes such a table, the others refuse it
+    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end
+    /// early then. The image tactus-rig takes such a table, the others refuse it
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
     /// The file to write; "-": standard output
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// How to print what was learned
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
-}
-
-/// What `learn` and `learn-by-hand` print as JSON.
-#[derive(Serialize)]
-struct Learned {
-    #[serde(flatten)]
-    table: TableFile,
-    /// Slides of each texture and movement that were to be learned from.
-    train_slides: usize,
-    /// Textures that have fewer of a movement.
-    short: Vec<Short>,
-    /// Textures without a good slide.
-    left_out: Vec<String>,
-}
-
-/// A texture with fewer slides of a movement than were asked for.
-#[derive(Serialize)]
-struct Short {
-    texture: String,
-    force_n: f32,
-    speed_mm_s: f32,
-    slides: usize,
-    #[serde(skip)]
-    movement: Movement,
 }
 
 /// Learn a handheld probe's table from slides of a simulated hand
@@ -108,12 +80,8 @@ pub(crate) struct ByHand {
     /// The finger that slides: biotac, analog or mems
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     finger: FingerName,
-    /// How to print what was learned
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// Learns a table from recordings.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let folder = args.from.folder()?;
     let (set, measured) = measure_folder(&folder)?;
@@ -134,30 +102,6 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let bytes = with_lengths(args, &set, bytes, &expected)?;
     write_table(&args.out, &bytes)?;
     let out = &mut beside(&args.out, out);
-    let mut short = Vec::new();
-    for (texture, measured) in set.textures().iter().zip(&measured) {
-        for movement in set.movements() {
-            let slides = measured.iter().filter(|s| s.movement == movement).count();
-            if slides < args.train_slides {
-                short.push(Short {
-                    texture: texture.name.clone(),
-                    force_n: movement.force_n(),
-                    speed_mm_s: movement.speed_mm_s(),
-                    slides,
-                    movement,
-                });
-            }
-        }
-    }
-    let learned = Learned {
-        table: TableFile::new(&args.out, Table::read(&bytes)?),
-        train_slides: args.train_slides,
-        short,
-        left_out: Vec::new(),
-    };
-    if args.format == Format::Json {
-        return print_json(&learned, out);
-    }
     writeln!(
         out,
         "{}: {} learned from the first {} of each, {} bytes",
@@ -166,9 +110,14 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         count(args.train_slides as u64, "slide"),
         bytes.len()
     )?;
-    for short in &learned.short {
-        let slides = count(short.slides as u64, "slide");
-        writeln!(out, "{}, {}: only {slides}", short.texture, short.movement)?;
+    for (texture, measured) in set.textures().iter().zip(&measured) {
+        for movement in set.movements() {
+            let slides = measured.iter().filter(|s| s.movement == movement).count();
+            if slides < args.train_slides {
+                let slides = count(slides as u64, "slide");
+                writeln!(out, "{}, {movement}: only {slides}", texture.name)?;
+            }
+        }
     }
     Ok(())
 }
@@ -186,7 +135,8 @@ fn with_lengths(
     let lengths_ms = rising(&args.lengths)?;
     ensure!(
         !Table::read(&bytes)?.is_paced(),
-        "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not both"
+        "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not \
+         both"
     );
     let textures = set.textures().len() as u64;
     let slides = with_progress(textures, "measuring first parts", |done| {
@@ -212,7 +162,6 @@ fn with_lengths(
     Ok(know_lengths(&bytes, &shorter)?)
 }
 
-/// Learns a handheld probe's table.
 pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()> {
     let collection = collection(&args.textures, args.trials, args.seed)?;
     let textures = collection.textures.len() as u64;
@@ -221,34 +170,26 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     })?;
     write_table(&args.out, &bytes)?;
     let out = &mut beside(&args.out, out);
-    let left_out = left_out.into_iter().map(|n| texture_name(n).to_owned());
-    let learned = Learned {
-        table: TableFile::new(&args.out, Table::read(&bytes)?),
-        train_slides: args.trials as usize,
-        short: Vec::new(),
-        left_out: left_out.collect(),
-    };
-    if args.format == Format::Json {
-        return print_json(&learned, out);
-    }
     writeln!(
         out,
         "{}: {} learned from {} of each by hand, {} bytes",
         args.out.display(),
         count(
-            (collection.textures.len() - learned.left_out.len()) as u64,
+            (collection.textures.len() - left_out.len()) as u64,
             "texture"
         ),
         count(args.trials, "slide"),
         bytes.len()
     )?;
-    for name in &learned.left_out {
+    for number in left_out {
+        let name = texture_name(number);
         writeln!(out, "left out, no good slide of it: {name}")?;
     }
     Ok(())
 }
 
-/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this folder.
+/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this
+/// folder.
 pub(crate) struct LearnedHere {
     first: usize,
     met: HashMap<(String, Movement), usize>,
@@ -263,7 +204,6 @@ impl LearnedHere {
     }
 }
 
-/// Which slides of this folder the table was learned from.
 pub(crate) fn learned_here(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
@@ -287,7 +227,8 @@ pub(crate) fn learned_here(
     }
 }
 
-/// Returns the slides as their first parts of the `n`th length. What stands for one that is not longer says nothing: see [`is_longer`].
+/// Returns the slides as their first parts of the `n`th length. What stands for one that is not longer says nothing:
+/// see [`is_longer`].
 fn of_length(slides: &[Vec<CutSlide>], n: usize) -> Vec<Vec<MeasuredSlide>> {
     let cut = |slide: &CutSlide| {
         let mut cut = slide.whole.clone();

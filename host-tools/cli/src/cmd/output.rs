@@ -34,7 +34,6 @@ impl Done {
 #[error("{0}\n\nFor more information, try '--help'.")]
 pub(crate) struct UsageError(pub(crate) String);
 
-/// For whom figures are printed.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
     /// For people

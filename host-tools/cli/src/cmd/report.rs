@@ -57,7 +57,6 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// What the page is made of.
 #[derive(Serialize)]
 struct Page<'r> {
     name: String,
@@ -67,7 +66,6 @@ struct Page<'r> {
     map: String,
 }
 
-/// Reports on a table, or on recorded slides.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     if let Some(table) = &args.table {
         return of_table(table, args, out);
@@ -80,7 +78,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 }
 
 fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    if args.recordings.len() > 1 || args.plot.is_asked() {
+    if args.recordings.len() > 1 || args.plot.plot.is_some() {
         let say = "with a table, give --recordings once and no --plot";
         return Err(UsageError(say.to_owned()).into());
     }

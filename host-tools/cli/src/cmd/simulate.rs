@@ -3,13 +3,11 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use tactus_core::sensor::FingerName;
 use tactus_lab::data::recording::Recording;
 use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::{Collection, calibrated};
 
-use super::output::{Format, print_json};
 use super::progress::progress;
 use super::textures::collection;
 
@@ -37,21 +35,10 @@ pub(crate) struct Args {
     /// The finger that slides: biotac, analog (piezo disc and load cell) or mems (accelerometer and load cell)
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     finger: FingerName,
-    /// How to print what was written
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// What `simulate --format json` prints.
-#[derive(Serialize)]
-struct Simulated {
-    folder: String,
-    textures: usize,
-    slides: usize,
-    seed: u64,
-}
-
-/// Records a collection into a folder, or what an interrupted command has not come to. Gives the number of slides that are there then.
+/// Records a collection into a folder, or what an interrupted command has not come to. Gives the number of slides that
+/// are there then.
 pub(crate) fn record(
     collection: &Collection,
     folder: &Path,
@@ -88,20 +75,10 @@ pub(crate) fn record(
     Ok(textures * each)
 }
 
-/// Records the textures asked for.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let collection = collection(&args.textures, args.trials, args.seed)?;
     let textures = collection.textures.len();
     let slides = record(&collection, &args.out, args.finger)?;
-    if args.format == Format::Json {
-        let simulated = Simulated {
-            folder: args.out.display().to_string(),
-            textures,
-            slides,
-            seed: args.seed,
-        };
-        return print_json(&simulated, out);
-    }
     let (folder, seed) = (args.out.display(), args.seed);
     writeln!(
         out,

@@ -4,35 +4,11 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use anyhow::Context as _;
-use serde::Serialize;
 use tactus_core::table::Table;
 use tactus_lab::data::table_file::{self, TableFileError};
 use tactus_lab::data::whole::write_whole;
 
 use super::progress::is_quiet;
-
-/// A good table file, for programs.
-#[derive(Serialize)]
-pub(crate) struct TableFile {
-    file: String,
-    textures: u16,
-    movements: usize,
-    bytes: usize,
-    /// CRC-32, in hexadecimal digits.
-    checksum: String,
-}
-
-impl TableFile {
-    pub(crate) fn new(file: &Path, table: Table<'_>) -> Self {
-        Self {
-            file: file.display().to_string(),
-            textures: table.textures(),
-            movements: table.movements().len(),
-            bytes: table.as_bytes().len(),
-            checksum: format!("{:08x}", table.crc()),
-        }
-    }
-}
 
 /// An old table is replaced whole or not at all; "-" is standard output.
 pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
@@ -44,7 +20,6 @@ pub(crate) fn write_table(file: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     write_whole(file, bytes).with_context(|| file.display().to_string())
 }
 
-/// Whether standard input or output stands for a file.
 pub(crate) fn is_pipe(file: &Path) -> bool {
     file == Path::new("-")
 }
@@ -60,7 +35,6 @@ pub(crate) fn beside<'o>(file: &Path, out: &'o mut impl Write) -> Box<dyn Write 
 
 /// A file to read; "-" is standard input.
 pub(crate) fn opened(file: &Path) -> io::Result<Box<dyn Read>> {
-    tracing::info!(file = %file.display(), "reads");
     Ok(if is_pipe(file) {
         Box::new(io::stdin().lock())
     } else {
@@ -68,7 +42,6 @@ pub(crate) fn opened(file: &Path) -> io::Result<Box<dyn Read>> {
     })
 }
 
-/// The table in a file; "-" is standard input.
 pub(crate) fn read_table<'b>(
     file: &Path,
     bytes: &'b mut Vec<u8>,

@@ -12,7 +12,6 @@ use tactus_world::textures::TEXTURES;
 use super::names::{nearest, unknown};
 use super::progress::with_progress;
 
-/// Opens a folder and measures all of its slides.
 pub(crate) fn measure_folder(
     folder: &Path,
 ) -> anyhow::Result<(RecordingSet, Vec<Vec<MeasuredSlide>>)> {
@@ -72,7 +71,6 @@ pub(crate) fn find_textures(wanted: &[String]) -> anyhow::Result<Vec<u8>> {
     wanted.iter().map(number).collect()
 }
 
-/// The textures that are named, each once.
 pub(crate) fn collection(wanted: &[String], trials: u32, seed: u64) -> anyhow::Result<Collection> {
     let mut textures = find_textures(wanted)?;
     textures.sort_unstable();

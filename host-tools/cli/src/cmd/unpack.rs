@@ -5,13 +5,11 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
-use serde::Serialize;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::factory;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::eval::show::count;
 
-use super::output::{Format, print_json};
 use super::simulate;
 use super::table_file::write_table;
 use super::textures::collection;
@@ -28,7 +26,7 @@ const RECORDINGS: &str = "recordings";
 #[command(after_help = "\
 Examples:
   tactus unpack tactus-data
-  tactus table show tactus-data/factory.tact
+  tactus table tactus-data/factory.tact
   tactus identify --recordings tactus-data/recordings --material Corduroy --train-slides 2
   tactus evaluate --recordings tactus-data/recordings --train-slides 2
 
@@ -38,30 +36,15 @@ interrupted one stopped.")]
 pub(crate) struct Args {
     /// The folder to write; a table of the same name that is another one is left alone
     folder: PathBuf,
-    /// How to print what was written
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// What `unpack --format json` prints.
-#[derive(Serialize)]
-struct Unpacked {
-    /// The files, by their paths.
-    tables: Vec<String>,
-    /// The folder.
-    recordings: String,
-    slides: usize,
-}
-
-/// Writes tables and recordings.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     fs::create_dir_all(&args.folder)
         .with_context(|| format!("cannot make {}", args.folder.display()))?;
-    let mut tables = Vec::new();
     for (name, table) in factory::ALL {
         let file = args.folder.join(name);
         write(&file, table)?;
-        tables.push(file.display().to_string());
+        writeln!(out, "{}", file.display())?;
     }
     let folder = args.folder.join(RECORDINGS);
     let collection = collection(&TEXTURES.map(str::to_owned), TRIALS, SEED)?;
@@ -72,26 +55,16 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             .sum(),
         _ => simulate::record(&collection, &folder, FingerName::Biotac)?,
     };
-    let unpacked = Unpacked {
-        tables,
-        recordings: folder.display().to_string(),
-        slides,
-    };
-    if args.format == Format::Json {
-        return print_json(&unpacked, out);
-    }
-    for table in &unpacked.tables {
-        writeln!(out, "{table}")?;
-    }
-    let (textures, slides) = (
+    writeln!(
+        out,
+        "{}: {}, {}",
+        folder.display(),
         count(TEXTURES.len() as u64, "texture"),
-        count(slides as u64, "slide"),
-    );
-    writeln!(out, "{}: {textures}, {slides}", unpacked.recordings)?;
+        count(slides as u64, "slide")
+    )?;
     Ok(())
 }
 
-/// Writes a table, unless it is there.
 fn write(file: &Path, table: &[u8]) -> anyhow::Result<()> {
     match fs::read(file) {
         Ok(there) => {

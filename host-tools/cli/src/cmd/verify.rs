@@ -56,8 +56,8 @@ pub(crate) struct Args {
     /// Recordings of what is held against it
     #[arg(long, value_name = "DIR", required_unless_present = "simulated")]
     sample: Option<PathBuf>,
-    /// The texture of these recordings, where they have several; what lies under the simulated finger, the reference's unless
-    /// given
+    /// The texture of these recordings, where they have several; what lies under the simulated finger, the reference's
+    /// unless given
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
     /// Slide live on the simulated rig, in place of recordings; the probe has learned the reference and others there
@@ -76,14 +76,12 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// A slide of the sample.
 struct Made {
     number: u32,
     movement: Movement,
     observation: Observation,
 }
 
-/// Holds the sample against the reference.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let Some(folder) = &args.sample else {
         return run_simulated(args, out);
@@ -165,7 +163,6 @@ fn run_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     hold(args, (&bytes, texture), name, PropertySet::ALL, made, out)
 }
 
-/// Place of a movement in a table.
 fn index_of(table: Table<'_>, movement: Movement) -> Option<u8> {
     let mut known = (0..).zip(table.movements());
     known.find_map(|(at, other)| (other == movement).then_some(at))
@@ -228,7 +225,6 @@ fn hold(
     Ok(Done::of(&verified))
 }
 
-/// The table with the reference in it.
 fn reference(args: &Args, sample: &Path) -> anyhow::Result<(Vec<u8>, u16)> {
     let mut bytes = Vec::new();
     let given = match &args.table {

@@ -9,7 +9,7 @@ use tactus_lab::sim::recorded::RecordedTexture;
 
 use super::args::World;
 use super::progress;
-use super::under_finger::{self, FirmwareData, KnownError, TRIALS, Unknown};
+use super::under_finger::{self, FirmwareData, TRIALS, UnderFingerError, Unknown};
 
 /// The source of the textures.
 enum Textures {
@@ -28,7 +28,7 @@ pub struct Chosen {
 
 impl Chosen {
     /// Draws the values that the arguments leave open.
-    pub fn new(cli: &World) -> Result<Self, KnownError> {
+    pub fn new(cli: &World) -> Result<Self, UnderFingerError> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
             let recorded_texture = under_finger::recordings(cli.method.method(), cli.seed)?;
@@ -41,7 +41,7 @@ impl Chosen {
         }
         let texture = match &cli.texture {
             Some(name) => {
-                texture_number(name).ok_or_else(|| KnownError::NoTexture(name.clone()))?
+                texture_number(name).ok_or_else(|| UnderFingerError::NoTexture(name.clone()))?
             }
             None => random.random_range(1..=117),
         };
@@ -60,7 +60,7 @@ impl Chosen {
     }
 
     /// Calibration of the rig and table of the textures for a method.
-    pub fn learn(&self, method: Method) -> Result<FirmwareData, KnownError> {
+    pub fn learn(&self, method: Method) -> Result<FirmwareData, UnderFingerError> {
         let bar;
         let known = match &self.textures {
             Textures::Simulated(finger, collection) => {

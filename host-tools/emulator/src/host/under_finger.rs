@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
-use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::recordings::{RecordingError, RecordingSet};
 use tactus_lab::sim::collection::{Collection, LearnError, calibrated, texture_name};
-use tactus_lab::sim::recorded::{PlayError, RecordedTexture};
+use tactus_lab::sim::recorded::RecordedTexture;
 use tactus_world::played::Played;
 use tactus_world::world::Setup;
 
@@ -22,7 +22,7 @@ pub(crate) const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5
 /// Reasons why there is nothing to learn, or no texture under the finger.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum KnownError {
+pub enum UnderFingerError {
     /// There are no recordings.
     #[error(
         "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and \
@@ -32,7 +32,7 @@ pub enum KnownError {
     NoData(PathBuf),
     /// They cannot be played.
     #[error(transparent)]
-    Play(#[from] PlayError),
+    Play(#[from] RecordingError),
     /// The simulated rig failed.
     #[error(transparent)]
     Learn(#[from] LearnError),
@@ -87,7 +87,7 @@ pub fn simulated(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<FirmwareData, KnownError> {
+) -> Result<FirmwareData, UnderFingerError> {
     simulated_with(FingerName::Biotac, collection, method, done)
 }
 
@@ -97,12 +97,12 @@ pub fn simulated_with(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<FirmwareData, KnownError> {
+) -> Result<FirmwareData, UnderFingerError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let setup = collection.setup_with(finger, first, 0);
     let calibration = calibrated(setup).map_err(LearnError::from)?;
     let movements = &Collection::MOVEMENTS;
-    let table = collection.learn_with(finger, movements, method, calibration, done)?;
+    let table = collection.learn_with(finger, movements, (method, None), calibration, done)?;
     Ok(FirmwareData { calibration, table })
 }
 
@@ -111,7 +111,7 @@ pub fn simulated_early(
     collection: &Collection,
     method: Method,
     done: impl Fn() + Sync,
-) -> Result<FirmwareData, KnownError> {
+) -> Result<FirmwareData, UnderFingerError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
     let lengths_ms = &Collection::LENGTHS_MS;
@@ -149,16 +149,16 @@ fn recorded_trials(method: Method) -> usize {
 
 /// The recordings of a real finger, to be learned from and played: in `biotac` below `TACTUS_DATA`, or else below
 /// `shared/data` beside the repository.
-pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownError> {
+pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, UnderFingerError> {
     let root = std::env::var_os("TACTUS_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
         PathBuf::from,
     );
     let folder = root.join("biotac");
     if !folder.is_dir() {
-        return Err(KnownError::NoData(folder));
+        return Err(UnderFingerError::NoData(folder));
     }
-    let set = RecordingSet::open(&folder).map_err(PlayError::from)?;
+    let set = RecordingSet::open(&folder)?;
     Ok(RecordedTexture::interleaved(
         &set,
         recorded_trials(method),
@@ -170,7 +170,7 @@ pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, KnownErr
 pub fn recorded(
     recorded_texture: &RecordedTexture,
     method: Method,
-) -> Result<FirmwareData, KnownError> {
+) -> Result<FirmwareData, UnderFingerError> {
     let calibration = calibrated(RecordedTexture::setup(0)).map_err(LearnError::from)?;
     let table = recorded_texture.learn(method, calibration)?;
     Ok(FirmwareData { calibration, table })
@@ -179,14 +179,14 @@ pub fn recorded(
 /// Number of a material by its name, in any case, or by its number from 1.
 ///
 /// # Errors
-/// [`KnownError::NoMaterial`].
-pub fn material(recorded_texture: &RecordedTexture, name: &str) -> Result<usize, KnownError> {
+/// [`UnderFingerError::NoMaterial`].
+pub fn material(recorded_texture: &RecordedTexture, name: &str) -> Result<usize, UnderFingerError> {
     let number = name.parse().ok().map(|n: usize| n.wrapping_sub(1));
     let mut names = recorded_texture.names.iter();
     names
         .position(|known| known.eq_ignore_ascii_case(name))
         .or(number.filter(|n| *n < recorded_texture.names.len()))
-        .ok_or_else(|| KnownError::NoMaterial {
+        .ok_or_else(|| UnderFingerError::NoMaterial {
             name: name.to_owned(),
             known: recorded_texture.names.join(", "),
         })

@@ -25,7 +25,7 @@ use crate::host::exploration::{Exploration, ExploreError, explore};
 use crate::host::power_cut::{Cut, Torn, left_by};
 use crate::host::progress;
 use crate::host::talk::{TIMEOUT_S, Talk, TalkError};
-use crate::host::under_finger::{self, FirmwareData, KnownError, Unknown};
+use crate::host::under_finger::{self, FirmwareData, UnderFingerError, Unknown};
 
 /// Cuts the power at every word that the firmware programs when a texture is labelled and when the probe learns by
 /// itself, and at seeded moments of an update that turns a page of its settings.
@@ -69,7 +69,7 @@ pub(crate) enum CutError {
     #[error(transparent)]
     Explore(#[from] ExploreError),
     #[error(transparent)]
-    Known(#[from] KnownError),
+    Known(#[from] UnderFingerError),
     #[error("the firmware did not {0}: nothing to cut")]
     Nothing(&'static str),
     #[error("{0}: the noted writes do not give the flash that the firmware left")]

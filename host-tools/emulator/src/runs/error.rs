@@ -5,7 +5,7 @@ use tactus_lab::sim::rig::SimError;
 use crate::board;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
-use crate::host::under_finger::KnownError;
+use crate::host::under_finger::UnderFingerError;
 use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
@@ -17,7 +17,7 @@ pub(crate) enum RunError {
     #[error(transparent)]
     Board(#[from] board::Error),
     #[error(transparent)]
-    Known(#[from] KnownError),
+    Learn(#[from] UnderFingerError),
     #[error(transparent)]
     Talk(#[from] TalkError),
     #[error(transparent)]

@@ -3,7 +3,10 @@
 
 use std::path::Path;
 
+use tactus_core::explorer::Method;
+use tactus_core::features::FeatureSet;
 use tactus_core::rig::Fault;
+use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Identify, Verdict};
 use tactus_emulator::board::Options;
 use tactus_emulator::host::arm::OnTheLine;
@@ -36,7 +39,11 @@ fn explore(elf: &Path, max_slides: u8, how: Option<Misbehaves>) -> Explored {
         trials: 2,
     };
     let calibration = calibrated(world.setup(TEXTURE, 0)).unwrap();
-    let table = world.learn_without_shear(calibration, || ()).unwrap();
+    let (finger, movements) = (FingerName::Biotac, &Collection::MOVEMENTS);
+    let bands = (Method::Fused, Some(FeatureSet::Bands));
+    let table = world
+        .learn_with(finger, movements, bands, calibration, || ())
+        .unwrap();
     let unknown = mounted(&world, TEXTURE, 3);
     let mut talk = Talk::new(unknown.start(elf, Options::default()).unwrap());
     let mut arm = OnTheLine::new(talk.board(), 1);

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerName;
 use tactus_core::table::{Change, Name, Table, amend};
 use tactus_core::wire::{Command, Forget, Identify, Train};
 use tactus_emulator::board::FlashWrite;
@@ -42,7 +43,8 @@ fn tables() -> (FirmwareData, Vec<u8>) {
     let short = under_finger::simulated(&world(), Method::Fused, || ()).unwrap();
     let movements: Vec<Movement> = Movement::grid().take(24).collect();
     let calibration = calibrated(world().setup(world().textures[0], 0)).unwrap();
-    let long = world().learn_at(&movements, Method::Fused, calibration, || ());
+    let (finger, fused) = (FingerName::Biotac, (Method::Fused, None));
+    let long = world().learn_with(finger, &movements, fused, calibration, || ());
     let long = long.unwrap();
     assert!(short.table.len() <= SHORT && long.len() > SHORT && long.len() < LONG);
     (short, long)

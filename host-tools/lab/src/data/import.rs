@@ -26,19 +26,16 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use tactus_core::features::Movement;
 
-use crate::data::content::ContentError;
 use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
-use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result};
+use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result, is_there};
 use crate::data::rows::Rows;
 
 pub mod signs;
 
-/// Sliding speed of the publisher's arm.
 const SPEED_UM_S: u32 = 25_000;
 /// The part at constant speed, in s.
 const WINDOW: (f32, f32) = (0.5, 5.5);
-/// Rate of the rows of a `_bio` file.
 const ROW_RATE_HZ: u32 = 100;
 /// Longest slide that is imported, in rows: a minute. The publisher's last six seconds.
 const MAX_ROWS: usize = 6000;
@@ -56,15 +53,13 @@ pub struct Imported {
 
 /// Converts the recordings in the folder `from` to the project's own format in the folder `to`; an interrupted import
 /// continues. `progress` is called with the number of slides done, and of slides in all.
-///
-/// # Errors
-/// If there are no recordings in `from`, a file is damaged, or `to` already holds recordings or cannot be written.
+/// Errors: if there are no recordings in `from`, a file is damaged, or `to` already holds recordings or cannot be
+/// written.
 pub fn import(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
-    match RecordingSet::open(from) {
-        Ok(set) => copy(&set, to, progress),
-        Err(RecordingError::NoManifest(_)) => import_csv(from, to, progress),
-        Err(e) => Err(e),
+    if !from.is_dir() || is_there(from) {
+        return copy(&RecordingSet::open(from)?, to, progress);
     }
+    import_csv(from, to, progress)
 }
 
 fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
@@ -93,7 +88,9 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
     let raw = if raw.is_dir() { raw } else { from.to_owned() };
     let materials = materials(&raw)?;
     if materials.is_empty() {
-        return Err(RecordingError::NothingToImport(from.to_owned()));
+        let cause = "nothing to import: neither a manifest, nor raw_data/mat1/mat1_1_bio.csv and the like of \
+                     https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, ...";
+        return Err(RecordingError::at(from, cause));
     }
     let mut done = Imported {
         textures: materials.len(),
@@ -164,10 +161,7 @@ fn number(text: &str) -> Option<u32> {
 }
 
 fn names(folder: &Path) -> Result<Vec<String>> {
-    let io_error = |cause| RecordingError::Io {
-        path: folder.to_owned(),
-        cause,
-    };
+    let io_error = |why: std::io::Error| RecordingError::at(folder, why);
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(io_error)? {
         // the publisher's names are ASCII: others are not his
@@ -176,14 +170,12 @@ fn names(folder: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// A writer that continues an import of this folder.
 fn begin(command: &str, from: &Path, to: &Path, textures: Vec<Texture>) -> Result<RecordingWriter> {
     let from = fs::canonicalize(from).unwrap_or_else(|_| from.to_owned());
     let command = format!("tactus {command} {} ...", from.display());
     RecordingWriter::begin(to, textures, &command)
 }
 
-/// The files of one slide.
 struct SlideFiles {
     bio_path: PathBuf,
     bio: Bio,
@@ -196,10 +188,8 @@ impl SlideFiles {
         let (bio_path, cw_path) = (file("bio"), file("cw"));
         let bio = read_bio(&bio_path)?;
         let force = read_force(&cw_path)?;
-        let shear = interpolate(&force, &bio.times).map_err(|cause| RecordingError::Samples {
-            path: cw_path,
-            cause,
-        })?;
+        let shear =
+            interpolate(&force, &bio.times).map_err(|cause| RecordingError::at(&cw_path, cause))?;
         Ok(Self {
             bio_path,
             bio,
@@ -209,11 +199,9 @@ impl SlideFiles {
 
     /// The slide, with the signs of its P_AC, which take most of a second.
     fn slide(self, texture: usize, number: u32) -> Result<Recording> {
-        let fault = |cause| RecordingError::Samples {
-            path: self.bio_path.clone(),
-            cause,
-        };
-        let movement = Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(e.into()))?;
+        let fault = |cause: String| RecordingError::at(&self.bio_path, cause);
+        let movement =
+            Movement::new(NOMINAL_FORCE_MN, SPEED_UM_S).map_err(|e| fault(e.to_string()))?;
         let slide = Recording {
             texture,
             number,
@@ -227,7 +215,11 @@ impl SlideFiles {
             pace: None,
             shear_rate_hz: ROW_RATE_HZ,
         };
-        let imported = |cause| fault(ContentError::Imported(Box::new(cause)));
+        let imported = |why| {
+            fault(format!(
+                "{why}; fetch the file again, or move it and its _cw away"
+            ))
+        };
         let slide = slide.cut(&[], &signs::rebuild(&self.bio.pac), Some(&self.shear));
         slide.map_err(imported)
     }
@@ -236,7 +228,6 @@ impl SlideFiles {
 #[derive(Default)]
 struct Bio {
     times: Vec<f64>,
-    /// magnitudes
     pac: Vec<u16>,
     pdc: Vec<i16>,
     lost_rows: usize,
@@ -258,21 +249,24 @@ fn read_bio(path: &Path) -> Result<Bio> {
         let count = |column| -> Result<u16> {
             let count = row.parse(column, COUNT)?;
             if count > 4095 {
-                return Err(row.error(Some(column), ContentError::Count(count)).into());
+                let why = format!("{count} is not a count of 0 to 4095");
+                return Err(row.error(Some(column), why));
             }
             Ok(count)
         };
         let time: f64 = row.number("timestamp")?;
         if let Some(before) = bio.times.last() {
             if time <= *before {
-                return Err(row.error(Some("timestamp"), ContentError::NotAfter).into());
+                let why = "not after the row before; fetch the file again";
+                return Err(row.error(Some("timestamp"), why));
             }
             // rows jitter by 2 ms
             let steps = ((time - before) * f64::from(ROW_RATE_HZ)).round() as usize;
             bio.lost_rows = bio.lost_rows.saturating_add(steps.saturating_sub(1));
         }
         if bio.times.len() == MAX_ROWS {
-            return Err(row.error(None, ContentError::Rows(MAX_ROWS)).into());
+            let why = format!("a slide has fewer rows than {MAX_ROWS}");
+            return Err(row.error(None, why));
         }
         bio.times.push(time);
         bio.pdc.push(count("pdc")?.cast_signed());
@@ -290,11 +284,13 @@ fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
     while let Some(row) = rows.next_row()? {
         let time = row.number("timestamp")?;
         if force.last().is_some_and(|(before, _)| time < *before) {
-            return Err(row.error(Some("timestamp"), ContentError::Before).into());
+            let why = "before that of the row before; fetch the file again";
+            return Err(row.error(Some("timestamp"), why));
         }
         let newton: f64 = row.number("fz")?;
         if newton.abs() > 32.0 {
-            return Err(row.error(Some("fz"), ContentError::Force(newton)).into());
+            let why = format!("{newton} N would tear the finger off; fetch the file again");
+            return Err(row.error(Some("fz"), why));
         }
         force.push((time, newton));
     }
@@ -303,13 +299,16 @@ fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
 
 /// The force at `times`, in mN: on a straight line between its neighbours, before the first and after the last as
 /// these.
-fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i16>, ContentError> {
+fn interpolate(force: &[(f64, f64)], times: &[f64]) -> std::result::Result<Vec<i16>, String> {
     let span = |of: Option<f64>, to: Option<f64>| of.zip(to);
     let measured = span(force.first().map(|f| f.0), force.last().map(|f| f.0));
     let wanted = span(times.first().copied(), times.last().copied());
     match (measured, wanted) {
         (Some(m), Some(w)) if m.0 <= w.1 && w.0 <= m.1 => {}
-        _ => return Err(ContentError::NoForce),
+        _ => {
+            let why = "no force at the time of the slide; fetch it and its _bio again";
+            return Err(why.to_owned());
+        }
     }
     // at most 32 N: fits
     let mn = on_line(force, times).map(|newton| (newton * 1e3).round() as i16);

@@ -34,7 +34,6 @@ pub struct Recorder {
     slide: Begun,
 }
 
-/// The data of a slide so far.
 #[derive(Debug, Default)]
 struct Begun {
     blocks: Vec<Block>,
@@ -75,9 +74,6 @@ impl Recorder {
 
     /// Takes in a report; the slide that counts from now on, for the texture of this index. One that ended early is no
     /// recording of its movement.
-    ///
-    /// # Errors
-    /// See [`RecordError`].
     pub fn hear(
         &mut self,
         texture: usize,

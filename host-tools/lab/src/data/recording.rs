@@ -5,12 +5,10 @@ use tactus_core::features::{Block, Movement, Slide};
 use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::RATE_HZ;
 
-use crate::data::content::ContentError;
 use crate::data::recordings::npy::MAX_SAMPLES;
 
 /// Rate of P_AC in every recording: the BioTac's 2200 Hz.
 pub const PAC_RATE_HZ: u32 = RATE_HZ;
-/// Rate of the shear that the project's rig measures, Hz.
 const SHEAR_HZ: u32 = 1000;
 
 /// One slide over one texture.
@@ -82,7 +80,7 @@ pub struct Labels {
 impl Recording {
     /// A recording from blocks, with P_DC beside them, of so many ms. Texture and number are left at 0. `None`: samples
     /// are missing.
-    pub fn from_blocks(
+    pub(crate) fn from_blocks(
         movement: Movement,
         blocks: Vec<Block>,
         pdc: Vec<i16>,
@@ -113,15 +111,13 @@ impl Recording {
 
     /// Takes the samples of whole streams, from the start of the record, in place of those it has: `still` is P_AC of
     /// the finger at rest, empty where its power is known.
-    ///
-    /// # Errors
-    /// The fault of the recording.
+    /// Errors: the fault of the recording.
     pub fn cut(
         mut self,
         still: &[i16],
         pac: &[i16],
         shear_mn: Option<&[i16]>,
-    ) -> Result<Self, ContentError> {
+    ) -> Result<Self, String> {
         let steady = self.steady(self.shear_rate_hz);
         let shear = shear_mn.map(|mn| {
             let (rest, after) = mn.split_at(steady.end.min(mn.len()));
@@ -194,14 +190,12 @@ impl Recording {
         sample(self.window.0)..sample(self.window.1)
     }
 
-    /// Refuses a recording that cannot be used: every reader and writer asks.
-    ///
-    /// # Errors
-    /// Its fault.
-    pub(crate) fn check(&self) -> Result<(), ContentError> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let (start, end) = self.window;
         if !(start.is_finite() && end.is_finite() && 0.0 <= start && start < end) {
-            return Err(ContentError::Window(start, end));
+            return Err(format!(
+                "the steady window {start} s to {end} s is not a stretch of time"
+            ));
         }
         let streams = [
             ("P_AC", PAC_RATE_HZ, Some(self.pac().len())),
@@ -217,25 +211,26 @@ impl Recording {
                 continue;
             };
             if rate_hz == 0 || rate_hz > 100_000 {
-                return Err(ContentError::Rate(rate_hz, stream));
+                return Err(format!("a rate of {rate_hz} Hz for {stream} is impossible"));
             }
             if samples > MAX_SAMPLES {
-                return Err(ContentError::Samples(samples, stream));
+                return Err(format!(
+                    "the samples of {stream} are {samples}, more than a slide can have ({MAX_SAMPLES})"
+                ));
             }
             if samples < self.steady(rate_hz).end {
-                return Err(ContentError::EndsEarly {
-                    stream,
-                    samples,
-                    rate_hz,
-                    end_s: end,
-                });
+                return Err(format!(
+                    "{stream} (samples: {samples}, at {rate_hz} Hz) ends before the steady window does ({end} s)"
+                ));
             }
         }
         match self.background {
             Some(power) if !power.is_finite() || power < 0.0 => {
-                Err(ContentError::BackgroundPower(power))
+                Err(format!("a background power of {power} is impossible"))
             }
-            None if self.still().is_empty() => Err(ContentError::NoStill),
+            None if self.still().is_empty() => {
+                Err("the record of the still finger is empty".to_owned())
+            }
             _ => Ok(()),
         }
     }

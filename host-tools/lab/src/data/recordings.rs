@@ -12,21 +12,19 @@ pub mod npy;
 pub mod own;
 mod writer;
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
 use crate::data::recording::{Labels, Recording, SlideKey, Texture};
-use files::Place;
 pub use files::{RecordingError, Result};
 pub use writer::{RecordingWriter, files as files_of};
 
 /// The recordings of one folder.
 #[derive(Debug)]
 pub struct RecordingSet {
-    place: Place,
+    folder: PathBuf,
     textures: Vec<Texture>,
     /// per texture, in the order of numbers
     slides: Vec<Vec<SlideKey>>,
@@ -42,45 +40,35 @@ enum Source {
 impl RecordingSet {
     /// Opens the recordings of `folder`: reads the manifest, not yet the samples. A `manifest.csv` goes before a
     /// `manifest.json`.
-    ///
-    /// # Errors
-    /// If there is no such folder or manifest, or the manifest makes no sense.
+    /// Errors: if there is no such folder or manifest, or the manifest makes no sense.
     pub fn open(folder: &Path) -> Result<Self> {
         if !folder.is_dir() {
-            return Err(RecordingError::NoFolder(folder.to_owned()));
+            let cause = "no such folder. `tactus unpack DIR` writes simulated ones; those of a real BioTac are at \
+                         https://github.com/dexrob/BioTac_slide_20_50, and `tactus import` reads them";
+            return Err(RecordingError::at(folder, cause));
         }
-        Self::at(Place::Folder(folder.to_owned()))
-    }
-
-    /// The recordings of a folder that is in memory: its files by their names in it.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
-    pub fn in_memory(folder: &str, files: BTreeMap<String, Vec<u8>>) -> Result<Self> {
-        Self::at(Place::Memory(folder.into(), files))
-    }
-
-    fn at(place: Place) -> Result<Self> {
-        let folder = place.folder();
-        let (source, textures, slides) = if place.has(files::OWN_MANIFEST) {
-            let manifest = own::Manifest::read(&place)?;
+        let has = |name| has(folder, name);
+        let (source, textures, slides) = if has(files::OWN_MANIFEST) {
+            let manifest = own::Manifest::read(folder)?;
             let (textures, slides) = manifest.contents();
             (Source::Own(manifest), textures, slides)
-        } else if place.has(files::BIOTAC_MANIFEST) {
-            let manifest = biotac::Manifest::read(&place)?;
+        } else if has(files::BIOTAC_MANIFEST) {
+            let manifest = biotac::Manifest::read(folder)?;
             let (textures, slides) = manifest.contents();
             (Source::Biotac(manifest), textures, slides)
-        } else if place.has(files::INCOMPLETE) {
-            let by = place.read(files::INCOMPLETE, files::INCOMPLETE, files::MAX_MANIFEST)?;
+        } else if has(files::INCOMPLETE) {
+            let by = files::read_bounded(&folder.join(files::INCOMPLETE), files::MAX_MANIFEST)?;
             let by = String::from_utf8_lossy(&by).into_owned();
-            return Err(RecordingError::Unfinished(folder.to_owned(), by));
+            return Err(RecordingError::unfinished(folder, &by));
         } else {
-            return Err(RecordingError::NoManifest(folder.to_owned()));
+            let cause = "neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the publisher's CSV \
+                         files (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first";
+            return Err(RecordingError::at(folder, cause));
         };
         let rows: usize = slides.iter().map(Vec::len).sum();
         tracing::info!(folder = %folder.display(), textures = textures.len(), slides = rows, "reads the manifest");
         Ok(Self {
-            place,
+            folder: folder.to_owned(),
             textures,
             slides,
             source,
@@ -89,7 +77,7 @@ impl RecordingSet {
 
     /// The folder that was opened.
     pub fn folder(&self) -> &Path {
-        self.place.folder()
+        &self.folder
     }
 
     /// The textures; each has at least one slide.
@@ -109,9 +97,7 @@ impl RecordingSet {
     }
 
     /// The finger that the slides were made with, and the day of its calibration, where it is the same of all, else 0.
-    ///
-    /// # Errors
-    /// They were made with two fingers.
+    /// Errors: they were made with two fingers.
     pub fn finger(&self) -> Result<(FingerCode, u32)> {
         let mut all = self.slides.iter().flatten();
         let first = all.next().map(|key| &key.labels);
@@ -124,7 +110,7 @@ impl RecordingSet {
         } in all.map(|key| &key.labels)
         {
             if *other != finger {
-                return Err(RecordingError::TwoFingers(finger, *other));
+                return Err(RecordingError::two_fingers(finger, *other));
             }
             if *date != calibrated {
                 calibrated = 0;
@@ -145,25 +131,30 @@ impl RecordingSet {
     }
 
     /// Reads the samples of texture number `index` of [`textures`](Self::textures), slides in the order of time.
-    ///
-    /// # Errors
-    /// If a file cannot be read, or its hash, size or format is wrong.
+    /// Errors: if a file cannot be read, or its hash, size or format is wrong.
     pub fn load_texture(&self, index: usize) -> Result<Vec<Recording>> {
-        if index >= self.textures.len() {
-            return Err(RecordingError::NoTexture {
-                folder: self.folder().to_owned(),
-                index,
-                count: self.textures.len(),
-            });
-        }
         let slides = match &self.source {
-            Source::Own(manifest) => manifest.load(&self.place, index),
-            Source::Biotac(manifest) => manifest.load(&self.place, index),
+            Source::Own(manifest) => manifest.load(&self.folder, index),
+            Source::Biotac(manifest) => manifest.load(&self.folder, index),
         }?;
         let texture = &self.textures[index].name;
         tracing::info!(texture, slides = slides.len(), "reads samples");
         Ok(slides)
     }
+}
+
+/// True if a folder has a manifest, or recordings that are not whole.
+pub(crate) fn is_there(folder: &Path) -> bool {
+    let manifests = [
+        files::OWN_MANIFEST,
+        files::BIOTAC_MANIFEST,
+        files::INCOMPLETE,
+    ];
+    manifests.iter().any(|name| has(folder, name))
+}
+
+fn has(folder: &Path, name: &str) -> bool {
+    folder.join(name).is_file()
 }
 
 #[cfg(test)]

@@ -11,9 +11,7 @@ use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::{RecordingError, RecordingSet};
 
 /// The properties of one recorded slide.
-///
-/// # Errors
-/// The slide has none: it is too short or silent.
+/// Errors: the slide has none: it is too short or silent.
 pub fn measure(plan: &Plan, recorded: &Recording) -> Result<Measurement, SlideError> {
     let mut slide = Slide::new(plan, recorded.movement);
     recorded.play(&mut slide);
@@ -31,33 +29,13 @@ pub struct MeasuredSlide {
     pub measurement: Measurement,
 }
 
-/// Reasons why a folder cannot be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum MeasureError {
-    /// It cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// One of its slides has no properties.
-    #[error("slide {number} of {texture}: {why}")]
-    Slide {
-        /// Name of the texture.
-        texture: String,
-        /// Number of the slide.
-        number: u32,
-        /// Its fault.
-        why: SlideError,
-    },
-}
-
 /// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns
 /// the slides of each texture in the order of time.
-///
-/// # Errors
-/// The first file that cannot be read, or the first slide that has no properties.
+/// Errors: the first file that cannot be read, or the first slide that has no properties.
 pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
-) -> Result<Vec<Vec<MeasuredSlide>>, MeasureError> {
+) -> Result<Vec<Vec<MeasuredSlide>>, RecordingError> {
     measure_each(set, done, |plan, slide| {
         Ok(MeasuredSlide {
             number: slide.number,
@@ -79,14 +57,12 @@ pub struct CutSlide {
 }
 
 /// As [`measure_all`], and the first part of each slide, of each of these lengths, in ms at constant speed.
-///
-/// # Errors
-/// As [`measure_all`]; the first part of a slide may be too short to have properties, too.
+/// Errors: as [`measure_all`]; the first part of a slide may be too short to have properties, too.
 pub fn measure_cut(
     set: &RecordingSet,
     lengths_ms: &[u16],
     done: impl Fn(&Texture) + Sync,
-) -> Result<Vec<Vec<CutSlide>>, MeasureError> {
+) -> Result<Vec<Vec<CutSlide>>, RecordingError> {
     measure_each(set, done, |plan, slide| {
         let first = |&ms: &u16| {
             slide
@@ -110,7 +86,7 @@ fn measure_each<T: Send>(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
     of: impl Fn(&Plan, &Recording) -> Result<T, SlideError> + Sync,
-) -> Result<Vec<Vec<T>>, MeasureError> {
+) -> Result<Vec<Vec<T>>, RecordingError> {
     let plan = Plan::new();
     (0..set.textures().len())
         .into_par_iter()
@@ -121,13 +97,12 @@ fn measure_each<T: Send>(
                 .load_texture(index)?
                 .iter()
                 .map(|slide| {
-                    of(&plan, slide).map_err(|why| MeasureError::Slide {
-                        texture: texture.name.clone(),
-                        number: slide.number,
-                        why,
+                    of(&plan, slide).map_err(|why| {
+                        let (number, texture) = (slide.number, &texture.name);
+                        RecordingError::said(format!("slide {number} of {texture}: {why}"))
                     })
                 })
-                .collect::<Result<Vec<_>, MeasureError>>()?;
+                .collect::<Result<Vec<_>, RecordingError>>()?;
             done(texture);
             Ok(measured)
         })
@@ -140,7 +115,6 @@ fn measure_each<T: Send>(
 pub struct Replay {
     /// Those that were not replayed yet.
     slides: Vec<Recording>,
-    /// The movements that were recorded.
     movements: Vec<Movement>,
     measures: PropertySet,
     random: ChaCha8Rng,
@@ -205,7 +179,6 @@ impl Rig for Replay {
         Ok(())
     }
 
-    /// Another movement may have slides left.
     async fn recover(&mut self, _failed: &ReplayError) -> bool {
         true
     }

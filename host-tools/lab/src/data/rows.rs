@@ -1,32 +1,19 @@
 //! Rows of a CSV table with a header, one at a time; every error names the file, the line and the column.
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::data::content::ContentError;
+use crate::data::recordings::RecordingError;
 
 /// Largest table that is read, in bytes: a damaged file must not fill the memory with one endless line.
 pub const MAX_BYTES: u64 = 64 << 20;
 
-/// A fault in a table, and its place.
-#[derive(thiserror::Error, Debug)]
-#[error("{}:{line}: {}{cause}", path.display(), column.map(|c| format!("column {c}: ")).unwrap_or_default())]
-pub struct RowError {
-    /// The table.
-    pub path: PathBuf,
-    /// Line in the file; the header is line 1. After empty lines it may be the number of the first of these.
-    pub line: u64,
-    /// Column, by its name in the header, if the error is about one.
-    pub column: Option<&'static str>,
-    /// The fault, and its remedy.
-    pub cause: ContentError,
-}
-
 /// A table that is being read.
 pub struct Rows {
     path: PathBuf,
-    reader: csv::Reader<BufReader<io::Take<Box<dyn Read>>>>,
+    reader: csv::Reader<BufReader<io::Take<File>>>,
     record: csv::StringRecord,
     header_fields: usize,
     /// where the wanted columns are
@@ -43,35 +30,20 @@ pub struct Row<'a> {
 
 impl Rows {
     /// Opens the table at `path`, which must have `columns`, in any order; it may have the `optional` ones, and others.
-    ///
-    /// # Errors
-    /// If the file cannot be read or a column is missing or there twice.
+    /// Errors: if the file cannot be read or a column is missing or there twice.
     pub fn open(
         path: &Path,
         columns: &[&'static str],
         optional: &[&'static str],
-    ) -> Result<Self, RowError> {
-        let file = File::open(path).map_err(|why| header_error(path, ContentError::Io(why)))?;
-        Self::of(path, Box::new(file), columns, optional)
-    }
-
-    /// The table that is read from there and called `path`, as [`open`](Self::open) wants it.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
-    pub fn of(
-        path: &Path,
-        table: Box<dyn Read>,
-        columns: &[&'static str],
-        optional: &[&'static str],
-    ) -> Result<Self, RowError> {
-        let header_error = |cause| header_error(path, cause);
+    ) -> Result<Self, RecordingError> {
+        let header_error = |cause: String| fault(path, 1, None, &cause);
+        let file = File::open(path).map_err(|why| header_error(why.to_string()))?;
         let mut reader = csv::ReaderBuilder::new()
             // of "\r\n" the first half is trimmed away: csv's own way of ending a line there counts lines one short
             .terminator(csv::Terminator::Any(b'\n'))
             .trim(csv::Trim::All)
             .flexible(true)
-            .from_reader(BufReader::new(table.take(MAX_BYTES)));
+            .from_reader(BufReader::new(file.take(MAX_BYTES)));
         let header = reader
             .headers()
             .map_err(|e| header_error(cause_of(e)))?
@@ -86,9 +58,14 @@ impl Rows {
                     (Some((i, _)), None) => Ok((name, i)),
                     (None, _) => {
                         let found: Vec<&str> = header.iter().take(50).collect();
-                        Err(header_error(ContentError::NoColumn(name, found.join(","))))
+                        let found = found.join(",");
+                        Err(header_error(format!(
+                            "no column {name} in the header ({found})"
+                        )))
                     }
-                    (Some(_), Some(_)) => Err(header_error(ContentError::TwoColumns(name))),
+                    (Some(_), Some(_)) => {
+                        Err(header_error(format!("two columns {name} in the header")))
+                    }
                 }
             })
             .collect::<Result<_, _>>()?;
@@ -102,17 +79,10 @@ impl Rows {
     }
 
     /// The next row; empty lines are skipped.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or the row has another number of fields than the header. One comma too many at the
-    /// end is let pass: the BioTac publisher's rows have it.
-    pub fn next_row(&mut self) -> Result<Option<Row<'_>>, RowError> {
-        let error = |line, cause| RowError {
-            path: self.path.clone(),
-            line,
-            column: None,
-            cause,
-        };
+    /// Errors: if the file cannot be read, or the row has another number of fields than the header. One comma too many
+    /// at the end is let pass: the BioTac publisher's rows have it.
+    pub(crate) fn next_row(&mut self) -> Result<Option<Row<'_>>, RecordingError> {
+        let error = |line, cause: String| fault(&self.path, line, None, &cause);
         loop {
             let line = self.reader.position().line();
             let more = self.reader.read_record(&mut self.record).map_err(|e| {
@@ -120,7 +90,8 @@ impl Rows {
                 error(line, cause_of(e))
             })?;
             if self.reader.get_ref().get_ref().limit() == 0 {
-                return Err(error(line, ContentError::LongTable(MAX_BYTES)));
+                let why = format!("the table is longer than {MAX_BYTES} bytes; split it");
+                return Err(error(line, why));
             }
             if !more {
                 return Ok(None);
@@ -133,7 +104,12 @@ impl Rows {
         let line = self.record.position().map_or(0, csv::Position::line);
         let (fields, wanted) = (self.record.len(), self.header_fields);
         if fields < wanted || self.record.iter().skip(wanted).any(|f| !f.is_empty()) {
-            return Err(error(line, ContentError::Fields(fields, wanted)));
+            return Err(error(
+                line,
+                format!(
+                    "{fields} fields where the header has {wanted}: cut off or damaged; fetch or write the file again"
+                ),
+            ));
         }
         Ok(Some(Row {
             path: &self.path,
@@ -156,70 +132,61 @@ impl<'a> Row<'a> {
     }
 
     /// The value in `column`; the error names `what` it should be.
-    ///
-    /// # Errors
-    /// If it is not.
+    /// Errors: if it is not.
     pub fn parse<T: FromStr>(
         &self,
         column: &'static str,
         what: &'static str,
-    ) -> Result<T, RowError> {
+    ) -> Result<T, RecordingError> {
         let text = self.text(column);
         let wrong = |_| {
             let text: String = text.chars().take(40).collect();
-            self.error(Some(column), ContentError::NotA(text, what))
+            self.error(Some(column), format!("{text:?} is not {what}"))
         };
         text.parse().map_err(wrong)
     }
 
     /// The finite number in `column`.
-    ///
-    /// # Errors
-    /// If it is not a number, or not finite.
-    pub fn number<T>(&self, column: &'static str) -> Result<T, RowError>
+    /// Errors: if it is not a number, or not finite.
+    pub fn number<T>(&self, column: &'static str) -> Result<T, RecordingError>
     where
         T: FromStr + Into<f64> + Copy,
     {
         let number: T = self.parse(column, "a number")?;
         if !number.into().is_finite() {
-            let text = self.text(column).to_owned();
-            return Err(self.error(Some(column), ContentError::NotFinite(text)));
+            let text = self.text(column);
+            let why =
+                format!("{text} is not a finite number; measure it again or leave the row out");
+            return Err(self.error(Some(column), why));
         }
         Ok(number)
     }
 
     /// An error in this row.
-    pub fn error(&self, column: Option<&'static str>, cause: ContentError) -> RowError {
-        RowError {
-            path: self.path.to_owned(),
-            line: self.line(),
-            column,
-            cause,
-        }
+    pub fn error(&self, column: Option<&str>, cause: impl Display) -> RecordingError {
+        fault(self.path, self.line(), column, &cause.to_string())
     }
 }
 
-fn header_error(path: &Path, cause: ContentError) -> RowError {
-    RowError {
-        path: path.to_owned(),
-        line: 1,
-        column: None,
-        cause,
-    }
+fn fault(path: &Path, line: u64, column: Option<&str>, cause: &str) -> RecordingError {
+    let column = column.map(|name| format!("column {name}: "));
+    let (path, column) = (path.display(), column.unwrap_or_default());
+    RecordingError::said(format!("{path}:{line}: {column}{cause}"))
 }
 
 /// The message of csv without the place, which the caller adds.
-fn cause_of(error: csv::Error) -> ContentError {
+fn cause_of(error: csv::Error) -> String {
     match error.kind() {
-        csv::ErrorKind::Io(_) => ContentError::Io(error.into()),
-        csv::ErrorKind::Utf8 { .. } => ContentError::NotUtf8,
-        _ => ContentError::Csv(error),
+        csv::ErrorKind::Io(_) => std::io::Error::from(error).to_string(),
+        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text, so this is not a table in CSV".to_owned(),
+        _ => error.to_string(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::cells;
 
     fn errors(text: &[u8]) -> (usize, String) {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -245,43 +212,24 @@ mod tests {
     #[test]
     fn the_line_is_right_whatever_ends_the_lines() {
         for end in ["\n", "\r\n"] {
-            for (lines, count, place) in [
-                (
-                    &["a,b", "1,2", "1,x"][..],
-                    1,
-                    ":3: column b: \"x\" is not a number",
-                ),
-                (
-                    &["b,c,a", "2,1,1", "2,1"],
-                    1,
-                    ":3: 2 fields where the header has 3",
-                ),
-                (
-                    &["a,b", "1,2", "1,2,", "1,2,3"],
-                    2,
-                    ":4: 3 fields where the header has 2",
-                ),
-                (
-                    &["a,b", "1,2", "1,inf"],
-                    1,
-                    ":3: column b: inf is not a finite number",
-                ),
-                (&["a,b", "1, 2 ", " \"1\",\"2\"", ""], 2, ""),
-                (
-                    &["a,b", "1,2", "1,", "", ""],
-                    1,
-                    ":3: column b: \"\" is not a number",
-                ),
-                (&["a,b", "\"1", "1\",2", "1,x"], 1, ":4: column b"),
-                (&["a,c"], 0, ":1: no column b in the header (a,c)"),
-                (&["a,b,a"], 0, ":1: two columns a"),
-            ] {
-                let (found, message) = errors(lines.join(end).as_bytes());
+            const CASES: &str = r#"
+a,b~1,2~1,x           | 1 | :3: column b: "x" is not a number
+b,c,a~2,1,1~2,1       | 1 | :3: 2 fields where the header has 3
+a,b~1,2~1,2,~1,2,3  | 2 | :4: 3 fields where the header has 2
+a,b~1,2~1,inf         | 1 | :3: column b: inf is not a finite number
+a,b~1, 2 ~ "1","2"~     | 2 |
+a,b~1,2~1,~~             | 1 | :3: column b: "" is not a number
+a,b~"1~1",2~1,x     | 1 | :4: column b
+a,c                       | 0 | :1: no column b in the header (a,c)
+a,b,a                     | 0 | :1: two columns a
+"#;
+            for [lines, count, place] in cells(CASES) {
+                let (found, message) = errors(lines.replace('~', end).as_bytes());
                 assert!(
                     message.contains(place) && message.is_empty() == place.is_empty(),
                     "{place:?} is not in {message:?}"
                 );
-                assert_eq!(found, count, "{lines:?}");
+                assert_eq!(found.to_string(), count, "{lines:?}");
             }
         }
         let (_, message) = errors(b"a,b\n1,2\n\xff,2");

@@ -5,9 +5,6 @@ use std::io;
 use std::path::Path;
 
 /// Writes a file as `PATH.part` and gives it its name when it is whole; it replaces a file of that name.
-///
-/// # Errors
-/// The system's.
 pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     let bytes = bytes.as_ref();
     tracing::info!(file = %path.display(), bytes = bytes.len(), "writes");

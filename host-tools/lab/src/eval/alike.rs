@@ -52,7 +52,6 @@ pub fn alike(table: Table<'_>, texture: u16, other: u16) -> Option<Alike> {
     })
 }
 
-/// Two textures at one movement.
 struct Apart {
     movement: u8,
     /// Squared distance of the means, in variances of a slide, over all features.

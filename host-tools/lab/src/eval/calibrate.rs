@@ -10,11 +10,8 @@ use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
 use tactus_core::features::{PropertySet, Vector, WHITE_STEPS};
 use tactus_core::table::{Against, Drifts, EPISODES, Limits, Table, Tail, Whitened};
 
-/// Most textures that an explorer of a probe holds.
 const FEW: usize = tactus_core::table::MAX_TEXTURES;
-/// Most textures that a PC learns.
 const MOST: usize = 2048;
-/// Draws for every training slide.
 const DRAWS: usize = 8;
 /// Largest correction of a slide's distance, squared.
 const FARTHEST: f64 = 5.0;
@@ -35,9 +32,7 @@ struct Residuals {
 
 /// Limits of `table`, whose sections have any limits so far. `white` has its slides, whitened, per texture and
 /// movement; `drifts` the variances of the drift at every movement, if there is any.
-///
-/// # Errors
-/// The table cannot be explored.
+/// Errors: the table cannot be explored.
 pub(crate) fn limits(
     false_alarm: f32,
     table: Table<'_>,

@@ -1,21 +1,20 @@
 //! Virtual explorations without a threshold: the belief after each slide, from which the verdict at any threshold
 //! follows.
 
-use tactus_core::explorer::{Config, Told};
+use tactus_core::explorer::{Config, VerdictKind};
 
 use crate::eval::evaluate::{EvaluateError, evaluate_by, play_with};
 use crate::eval::experiment::Experiment;
 
 /// The belief of an explorer after a slide.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Belief {
+pub(crate) struct Belief {
     /// The most probable texture.
     pub texture: usize,
     /// Its posterior probability.
     pub probability: f32,
     /// True if it is rather none of the known textures: then no threshold makes the texture sure.
     rather_new: bool,
-    /// True if the verdict would be a new texture.
     is_new: bool,
     /// True if it differs from the texture as it was learned.
     is_changed: bool,
@@ -26,14 +25,13 @@ pub struct Belief {
 pub struct Course {
     /// The texture that was to be identified.
     pub presented: usize,
-    /// After each slide.
-    pub beliefs: Vec<Belief>,
+    pub(crate) beliefs: Vec<Belief>,
 }
 
 impl Course {
     /// The verdict at this threshold, the slides until then, and the most probable texture. The choice of movements
     /// does not depend on the threshold, so the run at one is the beginning of the run at a higher one.
-    pub fn told(&self, threshold: f32) -> (Told, usize, usize) {
+    pub fn told(&self, threshold: f32) -> (VerdictKind, usize, usize) {
         let is_sure = |b: &Belief| b.probability > threshold && !b.rather_new && !b.is_changed;
         // that takes two slides: see `Explorer::verdict`
         let is_changed = |at, b: &Belief| at > 0 && b.probability > threshold && b.is_changed;
@@ -42,10 +40,10 @@ impl Course {
         let at = over.unwrap_or(self.beliefs.len().saturating_sub(1));
         let last = self.beliefs.get(at);
         let told = match last {
-            Some(b) if over.is_some() && is_sure(b) => Told::Sure,
-            Some(b) if b.is_new => Told::New,
-            Some(b) if b.is_changed => Told::Changed,
-            _ => Told::Undecided,
+            Some(b) if over.is_some() && is_sure(b) => VerdictKind::Sure,
+            Some(b) if b.is_new => VerdictKind::New,
+            Some(b) if b.is_changed => VerdictKind::Changed,
+            _ => VerdictKind::Undecided,
         };
         (
             told,
@@ -56,9 +54,6 @@ impl Course {
 }
 
 /// Plays runs as [`evaluate`](super::evaluate::evaluate) does, but without a threshold: see [`Course::told`].
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn courses(
     experiment: &Experiment,
     config: Config,
@@ -70,29 +65,23 @@ pub fn courses(
         threshold: 1.0,
         ..config
     };
-    evaluate_by(
-        experiment,
-        config,
-        runs,
-        done,
-        |explorer, confusions, run| {
-            let mut beliefs = Vec::new();
-            let outcome = play_with(explorer, confusions, config.strategy, run, |_, explorer| {
-                let best = explorer.best();
-                beliefs.push(Belief {
-                    texture: best.texture.into(),
-                    probability: best.probability,
-                    rather_new: config.open && best.log_odds.is_some_and(|odds| odds > 0.0),
-                    is_new: best.unknown,
-                    is_changed: best.changed,
-                });
+    evaluate_by(experiment, config, runs, done, |explorer, run| {
+        let mut beliefs = Vec::new();
+        let outcome = play_with(explorer, config.strategy, run, |_, explorer| {
+            let best = explorer.best();
+            beliefs.push(Belief {
+                texture: best.texture.into(),
+                probability: best.probability,
+                rather_new: config.open && best.log_odds.is_some_and(|odds| odds > 0.0),
+                is_new: best.unknown,
+                is_changed: best.changed,
             });
-            Course {
-                presented: outcome.unknown,
-                beliefs,
-            }
-        },
-    )
+        });
+        Course {
+            presented: outcome.unknown,
+            beliefs,
+        }
+    })
 }
 
 #[cfg(test)]

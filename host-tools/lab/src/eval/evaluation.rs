@@ -64,9 +64,6 @@ pub type Stage<'s> = dyn FnMut(&(dyn Fn() + Sync)) -> Result<(), EvaluateError> 
 
 /// Plays the explorations. `stage` gets the number of each stage, how many there are, and its work, which it has to do.
 /// Gives the courses behind [`Evaluation::reliability`], too.
-///
-/// # Errors
-/// See [`EvaluateError`].
 pub fn evaluation(
     experiment: Experiment,
     request: &EvaluationRequest,

@@ -17,23 +17,47 @@ use tactus_core::table;
 use crate::data::properties::PropertyTable;
 use crate::data::replay::MeasuredSlide;
 use crate::eval::learn::{Expected, TableError, learn_for};
+use crate::eval::show::count;
 
-mod error;
 mod protocol;
 
-pub use error::ExperimentError;
 pub use protocol::Protocol;
+
+/// A reason why slides do not make an experiment.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct ExperimentError(String);
+
+impl ExperimentError {
+    /// More movements than a table holds.
+    pub fn movements(number: usize) -> Self {
+        let max = table::MAX_MOVEMENTS;
+        Self(format!(
+            "too many movements, {number}; a table holds {max} at most"
+        ))
+    }
+
+    fn one(slides: usize) -> Self {
+        Self(format!(
+            "--train-slides {slides}: the spread of a texture's slides takes at least two slides"
+        ))
+    }
+
+    fn training(texture: &str, movement: Movement, there: usize, wanted: usize) -> Self {
+        let there = count(there as u64, "slide");
+        Self(format!(
+            "{texture}, {movement}: {there} to train from, and --train-slides is {wanted}; ask for fewer"
+        ))
+    }
+}
 
 /// Slides of a session that [`Protocol::Blocked`] trains from, out of [`SESSION`].
 const BLOCKED_TRAINING: usize = 19;
-/// Slides of a session in data/biotac.
 const SESSION: usize = 34;
 /// Limit of the slide numbers that blocked trains on, where a second folder brings the test slides ...
 const BLOCKED_BELOW: u32 = 30;
-/// ... and of those it tests on: they are above this.
 const BLOCKED_ABOVE: u32 = 34;
 
-/// Slides of one texture and movement.
 #[derive(Clone, PartialEq, Debug, Default)]
 struct Pool {
     /// Slides from which training slides are drawn, in the order of time.
@@ -49,7 +73,6 @@ pub struct Experiment {
     movements: Vec<Movement>,
     /// Per texture and movement.
     pools: Vec<Vec<Pool>>,
-    /// Textures that can be the unknown one.
     unknowns: Vec<usize>,
     /// Textures that the unknown one can be, as far as the explorer knows; all, unless given.
     candidates: Option<Vec<u16>>,
@@ -62,9 +85,7 @@ pub struct Experiment {
     measured: PropertySet,
     /// Features of the fused method; the best there are, unless given.
     features: Option<FeatureSet>,
-    /// Its other expectations.
     expected: Expected,
-    /// No run shows a test slide twice.
     once: bool,
     seed: u64,
 }
@@ -96,9 +117,6 @@ impl Experiment {
     }
 
     /// Recorded slides. Without a second folder the test slides come from the first.
-    ///
-    /// # Errors
-    /// See [`ExperimentError`].
     pub fn recorded(
         names: Vec<String>,
         observed: &[Vec<MeasuredSlide>],
@@ -108,7 +126,7 @@ impl Experiment {
         seed: u64,
     ) -> Result<Self, ExperimentError> {
         if train_slides < 2 {
-            return Err(ExperimentError::One(train_slides));
+            return Err(ExperimentError::one(train_slides));
         }
         let mut movements: Vec<Movement> = Vec::new();
         for slide in observed.iter().flatten() {
@@ -129,8 +147,13 @@ impl Experiment {
                 None => None,
                 Some((others, slides)) => {
                     let other = others.iter().position(|name| *name == names[texture]);
-                    let other =
-                        other.ok_or_else(|| ExperimentError::Missing(names[texture].clone()))?;
+                    let other = other.ok_or_else(|| {
+                        let name = &names[texture];
+                        ExperimentError(format!(
+                            "the test folder has no {name}, which the training folder has; give a folder of the same \
+                             textures"
+                        ))
+                    })?;
                     Some(of(&slides[other], movement))
                 }
             };
@@ -153,20 +176,19 @@ impl Experiment {
                 train: properties(&train),
                 test: tested.as_deref().map(properties),
             };
-            let texture = || names[texture].clone();
+            let texture = &names[texture];
             if there < train_slides {
-                return Err(ExperimentError::Training {
-                    texture: texture(),
+                return Err(ExperimentError::training(
+                    texture,
                     movement,
                     there,
-                    wanted: train_slides,
-                });
+                    train_slides,
+                ));
             }
             if pool.test.as_ref().map_or(there - train_slides, Vec::len) == 0 {
-                return Err(ExperimentError::Test {
-                    texture: texture(),
-                    movement,
-                });
+                return Err(ExperimentError(format!(
+                    "{texture}, {movement}: no slide is left to test on; train on fewer slides or give more with --test"
+                )));
             }
             Ok(pool)
         };
@@ -192,16 +214,13 @@ impl Experiment {
     /// used, not necessarily equally many, else the first so many.
     ///
     /// The movements have no force and speed; they stand in the table as the first cells of the grid.
-    ///
-    /// # Errors
-    /// See [`ExperimentError`].
     pub fn given(
         set: &PropertyTable,
         train_slides: Option<usize>,
         seed: u64,
     ) -> Result<Self, ExperimentError> {
         if set.movements.len() > table::MAX_MOVEMENTS {
-            return Err(ExperimentError::Movements(set.movements.len()));
+            return Err(ExperimentError::movements(set.movements.len()));
         }
         let wrap = |sets: &[Vec<Vec<[f32; 3]>>]| -> Vec<Vec<Vec<Observation>>> {
             let slide = |t: &[f32; 3]| Observation::from(Properties::new(t.map(Some)));
@@ -223,9 +242,6 @@ impl Experiment {
     /// Slides that were divided when they were collected: per texture and movement, those to train from, of which all
     /// or the first `train_slides` are used, and those to test with. Textures without test slides are never the unknown
     /// one. A table holds [`table::MAX_MOVEMENTS`] movements.
-    ///
-    /// # Errors
-    /// See [`ExperimentError`].
     pub fn collected(
         names: Vec<String>,
         movements: Vec<Movement>,
@@ -235,25 +251,19 @@ impl Experiment {
         seed: u64,
     ) -> Result<Self, ExperimentError> {
         if let Some(one @ ..2) = train_slides {
-            return Err(ExperimentError::One(one));
+            return Err(ExperimentError::one(one));
         }
         for (texture, row) in names.iter().zip(&train) {
             let wanted = train_slides.unwrap_or(2);
             let short = |(_, trials): &(_, &Vec<_>)| trials.len() < wanted;
             if let Some((&movement, trials)) = movements.iter().zip(row).find(short) {
-                let (texture, there) = (texture.clone(), trials.len());
+                let there = trials.len();
                 return Err(match train_slides {
-                    Some(wanted) => ExperimentError::Training {
-                        texture,
-                        movement,
-                        there,
-                        wanted,
-                    },
-                    None => ExperimentError::Few {
-                        texture,
-                        movement,
-                        there,
-                    },
+                    Some(wanted) => ExperimentError::training(texture, movement, there, wanted),
+                    None => ExperimentError(format!(
+                        "{texture}, {movement}: {there} training slide; the spread of a texture's slides takes at least \
+                         two"
+                    )),
                 });
             }
         }
@@ -314,7 +324,7 @@ impl Experiment {
     /// The same, and no run shows a slide twice: as with [`crate::data::replay::Replay`], a movement without a slide
     /// left is not made.
     #[must_use]
-    pub fn each_slide_once(self) -> Self {
+    pub(crate) fn each_slide_once(self) -> Self {
         Self { once: true, ..self }
     }
 
@@ -399,7 +409,6 @@ impl Experiment {
         random
     }
 
-    /// The run in the order of time.
     fn begin(&self, run: u64) -> Run<'_> {
         Run {
             experiment: self,
@@ -467,9 +476,6 @@ impl<'e> Run<'e> {
     }
 
     /// The texture table learned from the training slides, as bytes.
-    ///
-    /// # Errors
-    /// See [`TableError`].
     pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
         let of = self.experiment;
         learn_for(
@@ -483,10 +489,11 @@ impl<'e> Run<'e> {
     }
 
     /// As [`Run::learn`], without some of the textures.
-    ///
-    /// # Errors
-    /// See [`TableError`].
-    pub fn learn_without(&self, method: Method, out: &[usize]) -> Result<Vec<u8>, TableError> {
+    pub(crate) fn learn_without(
+        &self,
+        method: Method,
+        out: &[usize],
+    ) -> Result<Vec<u8>, TableError> {
         let of = self.experiment;
         let all = (0..).zip(of.names.iter().cloned().zip(self.training()));
         let kept = all.filter(|(texture, _)| !out.contains(texture));
@@ -513,7 +520,6 @@ impl<'e> Run<'e> {
         })
     }
 
-    /// The number of one more slide.
     pub(super) fn draw(&mut self, movement: usize) -> Option<usize> {
         let pool = &self.experiment.pools[self.unknown][movement];
         let learned = self.experiment.train_slides;

@@ -13,21 +13,9 @@ use crate::eval::show::count;
 /// Reasons why a folder makes no table.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstError {
-    /// A standard deviation needs two slides.
-    #[error("--train-slides {0}: the spread of a texture's slides takes at least two slides")]
-    One(usize),
-    /// As [`Self::One`], of one texture and movement.
-    #[error(
-        "{texture}, {movement}: {}; the spread of a texture's slides takes at least two", count(*there as u64, "slide")
-    )]
-    Few {
-        /// Name of the texture.
-        texture: String,
-        /// The movement.
-        movement: Movement,
-        /// Slides there are.
-        there: usize,
-    },
+    /// A texture has too few slides.
+    #[error("{0}")]
+    Few(String),
     /// The slides make no table.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -39,21 +27,27 @@ pub enum FirstError {
     Recording(#[from] RecordingError),
 }
 
+impl FirstError {
+    /// So few slides of one texture and movement.
+    pub fn few(texture: &str, movement: Movement, there: usize) -> Self {
+        let there = count(there as u64, "slide");
+        Self::Few(format!(
+            "{texture}, {movement}: {there}; the spread of a texture's slides takes at least two"
+        ))
+    }
+}
+
 /// Checks that there are enough slides to learn from.
-///
-/// # Errors
-/// [`FirstError::One`].
 pub fn at_least_two(slides: usize) -> Result<(), FirstError> {
     if slides < 2 {
-        return Err(FirstError::One(slides));
+        return Err(FirstError::Few(format!(
+            "--train-slides {slides}: the spread of a texture's slides takes at least two slides"
+        )));
     }
     Ok(())
 }
 
 /// The table learned from the first slides of every texture and movement: so many, or all where there are fewer.
-///
-/// # Errors
-/// See [`FirstError`].
 pub fn learn_first(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
@@ -72,12 +66,7 @@ pub fn learn_first(
             .collect();
         let there = trials.len();
         if there < 2 {
-            let texture = name.to_owned();
-            return Err(FirstError::Few {
-                texture,
-                movement,
-                there,
-            });
+            return Err(FirstError::few(name, movement, there));
         }
         Ok(trials)
     };

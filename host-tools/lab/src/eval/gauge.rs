@@ -55,20 +55,17 @@ pub struct Study {
     pub away: Vec<f64>,
 }
 
-/// Reasons why readings make no study.
+/// The reason why readings make no study.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum GaugeError {
-    /// Nothing to compare.
-    #[error(
-        "one part; a gauge study compares parts: give recordings of at least two textures or lots"
-    )]
-    OnePart,
-    /// Nothing was repeated.
-    #[error(
-        "no part has two slides by one operator; repeatability takes at least two: record with --slides 3"
-    )]
-    NoRepetition,
-}
+#[error("{0}")]
+pub struct GaugeError(&'static str);
+
+const ONE_PART: GaugeError = GaugeError(
+    "one part; a gauge study compares parts: give recordings of at least two textures or lots",
+);
+const NO_REPETITION: GaugeError = GaugeError(
+    "no part has two slides by one operator; repeatability takes at least two: record with --slides 3",
+);
 
 /// Mean moving range of two normal values in standard deviations, 2/sqrt(pi).
 const RANGE_IN_SD: f64 = std::f64::consts::FRAC_2_SQRT_PI;
@@ -92,14 +89,11 @@ fn mean(values: &[f64]) -> f64 {
 
 /// Splits the differences of the readings. Where numbers of repetitions differ, cells count alike, each as their
 /// harmonic mean (unweighted means). An interaction that is no larger than repetition explains counts as repetition.
-///
-/// # Errors
-/// See [`GaugeError`].
 pub fn study(readings: &[Reading]) -> Result<Study, GaugeError> {
     let parts = distinct(readings.iter().map(|r| r.part.as_str()));
     let operators = distinct(readings.iter().map(|r| r.operator.as_str()));
     if parts.len() < 2 {
-        return Err(GaugeError::OnePart);
+        return Err(ONE_PART);
     }
     let cell_of = |r: &Reading| {
         let part = parts.iter().position(|p| *p == r.part).unwrap_or_default();
@@ -118,7 +112,7 @@ pub fn study(readings: &[Reading]) -> Result<Study, GaugeError> {
     let filled = cells.iter().filter(|cell| !cell.is_empty());
     let repeated = readings.len() - filled.clone().count();
     if repeated == 0 {
-        return Err(GaugeError::NoRepetition);
+        return Err(NO_REPETITION);
     }
     let squares: f64 = away.iter().map(|a| a * a).sum();
     let mut within = squares / repeated as f64;

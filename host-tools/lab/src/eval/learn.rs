@@ -8,11 +8,14 @@ use tactus_core::sensor::FingerCode;
 use tactus_core::table::{
     self, Contents, Drift, Drifts, EncodeError, Experience, FALSE_ALARM, FINGER_LENGTH, Limits,
     Population, Scatter, Sections, Shorter, Table, Tail, WhitenError, Whitened, Whitening,
-    lengths_length, whiten_drifting, with_finger, with_lengths, with_sections,
+    whiten_drifting, with_finger, with_lengths, with_sections,
 };
 
 use super::calibrate::limits;
 use super::pace;
+
+/// Three sections, whose lengths are numbers of 16 bits.
+const MOST_SECTIONS: usize = 3 * (4 + u16::MAX as usize);
 
 /// Reasons why slides do not make a table.
 #[derive(Debug, thiserror::Error)]
@@ -56,7 +59,7 @@ pub fn measured(slides: &Slides) -> PropertySet {
 }
 
 /// The best features that every slide has: force, else P_DC, else bands alone, else the three properties.
-pub fn best_features(slides: &Slides) -> FeatureSet {
+pub(crate) fn best_features(slides: &Slides) -> FeatureSet {
     let has = |set: FeatureSet| {
         let mut all = slides.iter().flatten().flatten();
         all.all(|slide| length(set, slide) > 0 && slide.vector(set, length(set, slide)).is_some())
@@ -77,9 +80,6 @@ fn length(set: FeatureSet, slide: &Observation) -> usize {
 }
 
 /// Learns a table for a method; the fused one from `features`, or the best there are, for the usual drift.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn(
     method: Method,
     features: Option<FeatureSet>,
@@ -110,9 +110,7 @@ impl Default for Expected {
 }
 
 /// A table with the finger that its slides were made with, and the day of that finger's calibration.
-///
-/// # Errors
-/// These bytes are no table.
+/// Errors: these bytes are no table.
 pub fn name_finger(
     bytes: &[u8],
     finger: FingerCode,
@@ -133,9 +131,7 @@ pub fn name_finger(
 /// A table with the statistics of shorter slides, the shortest first: their length in ms, a table learned from the
 /// first parts of the same slides, and a bit for each movement whose slides are longer. Without any, the table without
 /// those statistics.
-///
-/// # Errors
-/// A table is invalid, or not of the same textures and movements.
+/// Errors: A table is invalid, or not of the same textures and movements.
 pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let shorter = shorter.iter().map(|(ms, table, movements)| {
@@ -147,7 +143,9 @@ pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec
         })
     });
     let shorter = shorter.collect::<Result<Vec<_>, EncodeError>>()?;
-    let mut out = vec![0; bytes.len() + lengths_length(&shorter)];
+    // a section is shorter than its table
+    let sections = shorter.iter().map(|shorter| shorter.table.as_bytes().len());
+    let mut out = vec![0; bytes.len() + sections.sum::<usize>()];
     let length = with_lengths(&mut out, &table, &shorter)?.as_bytes().len();
     out.truncate(length);
     Ok(out)
@@ -164,9 +162,6 @@ pub struct ObservedTrial {
 
 /// As [`learn_for`], with features after each of these lengths, in ms at constant speed, the shortest first: those that
 /// each trial was observed at.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn_lengths(
     expected: &Expected,
     method: Method,
@@ -200,9 +195,6 @@ pub fn learn_lengths(
 }
 
 /// As [`learn`], with these expectations.
-///
-/// # Errors
-/// See [`TableError`].
 pub fn learn_for(
     expected: &Expected,
     method: Method,
@@ -239,9 +231,6 @@ pub fn experience(measured: PropertySet, slides: &[Observation]) -> Experience {
 }
 
 /// Writes a table of Gaussians of any size.
-///
-/// # Errors
-/// See [`EncodeError`].
 pub fn encode(
     measured: PropertySet,
     movements: &[Movement],
@@ -251,7 +240,7 @@ pub fn encode(
     let textures = names
         .iter()
         .zip(experience)
-        .map(|(name, experience)| table::Texture { name, experience });
+        .map(|(name, known)| (name.as_str(), &known[..]));
     let mut bytes = buffer(Contents::Gaussians(measured), names, movements.len());
     table::encode(&mut bytes, measured, movements, textures)?;
     Ok(bytes)
@@ -339,8 +328,11 @@ fn learn_fused(
             novelty,
             slopes: whitened.as_ref().map(pace::Whitened::slopes),
         };
-        let mut bytes = vec![0; plain.as_bytes().len() + sections.length(features)];
-        with_sections(&mut bytes, &plain, &sections)?;
+        let mut bytes = vec![0; plain.as_bytes().len() + MOST_SECTIONS];
+        let length = with_sections(&mut bytes, &plain, &sections)?
+            .as_bytes()
+            .len();
+        bytes.truncate(length);
         Ok::<_, EncodeError>(bytes)
     };
     let Some(populations) = populations else {

@@ -10,20 +10,16 @@ const POOLED_SLIDES: f64 = 10.0;
 /// Least standard deviation of ln(speed) within a texture that slopes can be learned from: a rig holds its speed.
 const LEAST_SPREAD: f64 = 0.02;
 
-/// A number for each feature.
 type Numbers = [f64; MAX_FEATURES];
 
-/// The lines of all textures at one movement.
 struct Movement {
     /// Mean and variance of ln(speed), and the slope of all textures together, per unit of ln(speed).
     mean: f64,
     variance: f64,
     pooled: Numbers,
-    /// Of every texture.
     own: Vec<Numbers>,
 }
 
-/// The lines of a table to be made.
 pub(super) struct Lines {
     movements: Vec<Movement>,
     /// Per texture and movement, ln(speed) of the slides.
@@ -55,14 +51,12 @@ pub(super) fn lines(
     })
 }
 
-/// Sums over the slides of a texture at a movement.
 struct Cell {
     slides: f64,
     /// Of ln(speed).
     pace: f64,
     /// Of its squared deviations from the texture's mean.
     squares: f64,
-    /// Of the products of these deviations with features.
     products: Numbers,
 }
 
@@ -146,7 +140,6 @@ impl Lines {
             .collect()
     }
 
-    /// The same in whitened features.
     pub(super) fn whitened(self, whitenings: &[Whitening]) -> Whitened {
         let of = self.movements.iter().zip(whitenings);
         let paces = of.clone().map(|(movement, whitening)| Pace {

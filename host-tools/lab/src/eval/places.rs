@@ -33,7 +33,11 @@ pub fn distances(table: Table<'_>, at: Option<u8>) -> Vec<Vec<f64>> {
 
 /// Distance of a slide of a movement from each texture of a fused table, in standard deviations within a texture;
 /// `None` if it lacks features.
-pub fn slide_distances(table: Table<'_>, movement: u8, slide: &Observation) -> Option<Vec<f64>> {
+pub(crate) fn slide_distances(
+    table: Table<'_>,
+    movement: u8,
+    slide: &Observation,
+) -> Option<Vec<f64>> {
     let all = |one: &dyn Fn(u16) -> f64| (0..table.textures()).map(one).collect();
     match table.contents() {
         Contents::Fused(set, features) => {
@@ -84,9 +88,7 @@ fn apart_by_properties(table: Table<'_>, movement: u8, textures: [u16; 2]) -> Op
 pub struct Plane {
     /// A place for each.
     pub places: Vec<(f64, f64)>,
-    /// Mean squared distance of each from all.
     means: Vec<f64>,
-    /// Contribution of a squared distance from each to each axis.
     axes: [Vec<f64>; 2],
 }
 
@@ -145,7 +147,7 @@ impl Plane {
 
     /// The same plane, turned and mirrored to lie as near as possible to another one of the same.
     #[must_use]
-    pub fn turned_to(mut self, other: &Self) -> Self {
+    pub(crate) fn turned_to(mut self, other: &Self) -> Self {
         let pairs = || self.places.iter().zip(&other.places);
         // of turns and of turns of the mirror image, the better one has the longer sum
         let sum = |mirror: f64| {
@@ -190,7 +192,6 @@ pub fn off(distances: &[Vec<f64>], places: &[(f64, f64)]) -> f64 {
     if all > 0.0 { (apart / all).sqrt() } else { 0.0 }
 }
 
-/// Rounds of the power method: the error of the nearest of two axes is too small to be seen.
 const ROUNDS: usize = 300;
 
 /// The greatest eigenvalue of a symmetric matrix, at least 0, and its vector, by the power method.

@@ -8,7 +8,6 @@
 //! moments). The mean's error then has the variance (1 - w)^2 (1/n + t^2) + w^2/k; the table notes as many slides for
 //! the texture as would leave an error as large.
 
-use serde::Serialize;
 use tactus_core::features::{Vector, WHITE_STEPS};
 use tactus_core::table::{Contents, EncodeError, Table, recentre, retell};
 
@@ -25,7 +24,7 @@ pub struct NewSlide {
     pub features: Vec<i16>,
 }
 
-/// The result.
+/// A table that was moved by new slides.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Refreshed {
     /// The table.
@@ -39,7 +38,7 @@ pub struct Refreshed {
 }
 
 /// Shift of a texture.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Moved {
     /// Its name.
     pub texture: String,
@@ -48,7 +47,7 @@ pub struct Moved {
 }
 
 /// Two textures that ten slides do not separate.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Pair {
     /// The one.
     pub first: String,
@@ -58,27 +57,22 @@ pub struct Pair {
     pub before: bool,
 }
 
-/// Reasons why a table was not refreshed.
+/// The reason why a table was not refreshed.
 #[derive(Debug, thiserror::Error)]
-pub enum RefreshError {
-    /// The table does not compare whitened features.
-    #[error("only tables with whitened features can be refreshed: learn this one again")]
-    NotFused,
-    /// There is no new slide.
-    #[error("no slide of a texture of the table was made")]
-    NoSlide,
-    /// The new table cannot be written.
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
+#[error("{0}")]
+pub struct RefreshError(String);
+
+impl From<EncodeError> for RefreshError {
+    fn from(why: EncodeError) -> Self {
+        Self(why.to_string())
+    }
 }
 
 /// Moves the learned means by new slides.
-///
-/// # Errors
-/// See [`RefreshError`].
 pub fn refresh(table: Table<'_>, slides: &[NewSlide]) -> Result<Refreshed, RefreshError> {
     let Contents::Fused(..) = table.contents() else {
-        return Err(RefreshError::NotFused);
+        let why = "only tables with whitened features can be refreshed: learn this one again";
+        return Err(RefreshError(why.to_owned()));
     };
     let mut bytes = table.as_bytes().to_vec();
     let mut together = Mean::default();
@@ -136,14 +130,15 @@ pub fn refresh(table: Table<'_>, slides: &[NewSlide]) -> Result<Refreshed, Refre
     moved.sort_by(|a, b| b.moved.total_cmp(&a.moved));
     let alike = pairs(table, Table::read(&bytes).map_err(EncodeError::Invalid)?);
     Ok(Refreshed {
-        together: together.root().ok_or(RefreshError::NoSlide)?,
+        together: together.root().ok_or_else(|| {
+            RefreshError("no slide of a texture of the table was made".to_owned())
+        })?,
         bytes,
         moved,
         alike,
     })
 }
 
-/// Root mean square.
 #[derive(Clone, Copy, Default)]
 struct Mean {
     squares: f64,
@@ -166,9 +161,7 @@ struct Shift {
     texture: u16,
     /// Of their mean along each axis, standard deviations of a slide.
     by: Vec<f64>,
-    /// Variance of their mean.
     new: f64,
-    /// Variance of the mean that was learned.
     learned: f64,
 }
 

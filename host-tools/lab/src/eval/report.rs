@@ -8,7 +8,7 @@ use tactus_core::table::{Contents, Table};
 
 use crate::data::replay::MeasuredSlide;
 use crate::eval::alike::{Alike, alike, nearest};
-use crate::eval::evaluate::{EvaluateError, Method, Shared, explorer, play};
+use crate::eval::evaluate::{EvaluateError, Method, explorer, play};
 use crate::eval::experiment::Experiment;
 use crate::eval::samples;
 use crate::eval::show::count;
@@ -19,7 +19,6 @@ use crate::eval::verdicts::Verdicts;
 pub const RUNS: u64 = 25;
 /// Share of confused slides below which a pair is not listed.
 const WORTH_SAYING: f64 = 0.01;
-/// Most pairs that are listed.
 const PAIRS: usize = 20;
 /// Distance of the recorded slides' mean, in standard deviations of the mean, from which a texture counts as changed.
 const MOVED: f64 = 3.0;
@@ -78,7 +77,7 @@ pub struct Recorded {
     /// Mean number of slides until then, of the known ones.
     pub mean_slides: f64,
     /// Textures of the recordings that the table does not have.
-    pub not_in_table: Vec<String>,
+    pub(crate) not_in_table: Vec<String>,
 }
 
 /// The verdicts on recorded slides of one texture.
@@ -119,9 +118,6 @@ pub struct Slides {
 
 impl Report {
     /// Of a table, and of recorded slides if there are any.
-    ///
-    /// # Errors
-    /// See [`ReportError`].
     pub fn new(
         table: Table<'_>,
         slides: Option<&[Slides]>,
@@ -192,14 +188,13 @@ impl Report {
             set.and(s.measurement.properties.measured())
         });
         let explorer = explorer(table.as_bytes(), measured, config, None)?;
-        let shared = Shared::new(explorer, config.strategy);
         let outcomes: Vec<_> = (0..RUNS * whole.len() as u64)
             .into_par_iter()
             .map_init(
-                || shared.explorer.clone(),
+                || explorer.clone(),
                 |explorer, run| {
                     let run = experiment.run(run);
-                    let outcome = play(explorer, shared.confusions.as_ref(), config.strategy, run);
+                    let outcome = play(explorer, config.strategy, run);
                     done();
                     outcome
                 },
@@ -254,7 +249,6 @@ impl Report {
     }
 }
 
-/// Pairs that are worth a line.
 fn pairs(table: Table<'_>) -> Vec<Pair> {
     let all = (0..table.textures()).flat_map(|a| {
         (0..table.textures())

@@ -46,7 +46,6 @@ pub fn advice(stayed: &[&str]) -> Option<String> {
 mod tests {
     use tactus_core::explorer::Method;
     use tactus_core::features::{Movement, Observation, Properties};
-    use tactus_core::table::samples_length;
 
     use super::*;
     use crate::eval::learn::learn;
@@ -81,7 +80,7 @@ mod tests {
                 (read.drift(), read.limits()),
                 (before.drift(), before.limits())
             );
-            assert_eq!(noted.len(), plain.len() + samples_length(3));
+            assert_eq!(noted.len(), plain.len() + 4 + 5 * 3);
             // taken back, only its ancestor is named
             let again = note(&noted, |_| None).unwrap();
             assert_eq!(again.len(), plain.len());
@@ -95,47 +94,40 @@ mod tests {
 
     #[test]
     fn what_is_said_is_true_of_all() {
-        let of = |all: &[Option<bool>]| of_all(all.iter().copied());
-        assert_eq!(of(&[]), None);
-        assert_eq!(of(&[Some(true), Some(true)]), Some(true));
-        assert_eq!(of(&[Some(false)]), Some(false));
-        assert_eq!(of(&[Some(true), Some(false)]), None);
-        assert_eq!(of(&[None, Some(true)]), None);
-        assert_eq!(of(&[Some(true), None]), None);
+        let (yes, no) = (Some(true), Some(false));
+        for (all, of) in [
+            (&[][..], None),
+            (&[yes, yes], yes),
+            (&[no], no),
+            (&[yes, no], None),
+            (&[None, yes], None),
+            (&[yes, None], None),
+        ] {
+            assert_eq!(of_all(all.iter().copied()), of, "{all:?}");
+        }
     }
 
     #[test]
-    fn what_is_noted_is_true_of_all_trials() {
-        let of = |before: Option<Option<bool>>, said: &[bool]| {
+    fn what_is_noted_of_trials_is_true_of_all_and_of_each() {
+        let (yes, no) = (Some(true), Some(false));
+        // said before the first trial, between trials; noted of all, and before each
+        for (first, said, all, each) in [
+            (None, &[][..], None, &[None][..]),
+            (None, &[true, true], yes, &[yes; 3]),
+            (None, &[false, false], no, &[no; 3]),
+            (None, &[true, false], None, &[None, yes, no]),
+            (Some(None), &[true, true], None, &[]),
+            (Some(yes), &[true], yes, &[]),
+            (Some(no), &[true], None, &[]),
+            (Some(yes), &[], yes, &[]),
+        ] {
             let mut trials = Trials::default();
-            if let Some(before) = before {
-                trials.said(before);
+            first.iter().for_each(|before| trials.said(*before));
+            said.iter().for_each(|moved| trials.said(Some(*moved)));
+            assert_eq!(trials.moved(), all, "{first:?} {said:?}");
+            for (trial, noted) in each.iter().enumerate() {
+                assert_eq!(trials.before_trial(trial), *noted, "{said:?}");
             }
-            said.iter().for_each(|moved| trials.said(Some(*moved)));
-            trials.moved()
-        };
-        assert_eq!(of(None, &[]), None);
-        assert_eq!(of(None, &[true, true]), Some(true));
-        assert_eq!(of(None, &[false, false]), Some(false));
-        assert_eq!(of(None, &[true, false]), None);
-        assert_eq!(of(Some(None), &[true, true]), None);
-        assert_eq!(of(Some(Some(true)), &[true]), Some(true));
-        assert_eq!(of(Some(Some(false)), &[true]), None);
-        assert_eq!(of(Some(Some(true)), &[]), Some(true));
-    }
-
-    #[test]
-    fn a_trial_is_noted_as_it_was_said_and_the_first_one_as_all_others() {
-        let of = |said: &[bool]| -> Vec<Option<bool>> {
-            let mut trials = Trials::default();
-            said.iter().for_each(|moved| trials.said(Some(*moved)));
-            (0..=said.len())
-                .map(|trial| trials.before_trial(trial))
-                .collect()
-        };
-        assert_eq!(of(&[true, true]), [Some(true); 3]);
-        assert_eq!(of(&[false]), [Some(false); 2]);
-        assert_eq!(of(&[true, false]), [None, Some(true), Some(false)]);
-        assert_eq!(of(&[]), [None]);
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
-use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
+use tactus_core::explorer::{ExpectedOutcome, Verdict, VerdictKind};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
@@ -24,7 +24,6 @@ pub struct Show<'t, W> {
     table: Table<'t>,
     out: W,
     slides: u32,
-    /// The last prompt to the person.
     prompt: Option<Prompt>,
     answered: Option<(Verdict, u8)>,
     /// The first failure to write, kept until the end.
@@ -76,9 +75,6 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows the next action and its reason.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn chosen(&mut self, action: Action, expected: &[ExpectedOutcome]) -> io::Result<()> {
         writeln!(
             self.out,
@@ -93,10 +89,7 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows the features of a slide, and the textures that remain after it.
-    ///
-    /// # Errors
-    /// A failure to write.
-    pub fn slide_report(
+    pub(crate) fn slide_report(
         &mut self,
         action: Action,
         properties: &Properties,
@@ -131,18 +124,12 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows a line of something else in between.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn line(&mut self, line: &str) -> io::Result<()> {
         writeln!(self.out, "{line}")?;
         self.out.flush()
     }
 
     /// Shows a probe's event of an exploration, up to its answer; shows nothing for any other.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn event(&mut self, event: &Event) -> io::Result<()> {
         match event {
             Event::Chosen {
@@ -273,9 +260,6 @@ impl<'t, W: Write> Show<'t, W> {
     }
 
     /// Shows the answer, and whether it is right.
-    ///
-    /// # Errors
-    /// The first failure to write.
     pub fn finish(mut self, verdict: Verdict, slides: u8, truth: &str) -> io::Result<()> {
         std::mem::replace(&mut self.failed, Ok(()))?;
         self.answer(verdict, slides)?;
@@ -286,14 +270,13 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
-    /// Shows the answer.
     fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
         self.answered = Some((verdict, slides));
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
         let slides = count(slides, "slide");
-        match verdict.told() {
-            Told::New => {
+        match verdict.kind() {
+            VerdictKind::New => {
                 let odds = verdict
                     .log_odds
                     .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
@@ -303,13 +286,15 @@ impl<'t, W: Write> Show<'t, W> {
                     count(self.table.textures(), "texture")
                 )
             }
-            Told::Changed => writeln!(
+            VerdictKind::Changed => writeln!(
                 self.out,
                 "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like \
                  it."
             ),
-            Told::Sure => writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}."),
-            Told::Undecided => writeln!(
+            VerdictKind::Sure => {
+                writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")
+            }
+            VerdictKind::Undecided => writeln!(
                 self.out,
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
             ),
@@ -319,19 +304,16 @@ impl<'t, W: Write> Show<'t, W> {
 
 /// Returns true if a verdict is right about the texture of this name; `None` if it is undecided.
 pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
-    match verdict.told() {
-        Told::Sure => Some(table.name(verdict.texture) == Some(truth)),
-        Told::New => Some(table.find(truth).is_none()),
+    match verdict.kind() {
+        VerdictKind::Sure => Some(table.name(verdict.texture) == Some(truth)),
+        VerdictKind::New => Some(table.find(truth).is_none()),
         // for another texture it is no wrong answer: the verdict is that the texture is not as learned
-        Told::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
-        Told::Undecided => None,
+        VerdictKind::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
+        VerdictKind::Undecided => None,
     }
 }
 
 /// Prints what a table holds.
-///
-/// # Errors
-/// A failure to write.
 pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,

@@ -1,4 +1,4 @@
-//! The contents of a table as one object for programs: the JSON of `tactus table show`.
+//! The contents of a table as one object for programs: the JSON of `tactus table`.
 
 use serde::Serialize;
 use tactus_core::features::Property;
@@ -10,70 +10,62 @@ use crate::eval::show::apart;
 /// A table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TableSummary {
-    /// Length of its binary form.
-    pub bytes: usize,
+    bytes: usize,
     /// CRC-32 of it, in hexadecimal digits.
-    pub checksum: String,
+    checksum: String,
     /// Basis of the comparison: the three properties, or a set of whitened features.
-    pub features: &'static str,
-    /// The finger that it was learned with.
-    pub finger: FingerCode,
+    features: &'static str,
+    finger: FingerCode,
     /// Day on which that finger's force per count was measured, as 20261121; 1 if the day is unknown, 0 if it was not
     /// measured or that is unknown.
-    pub finger_calibrated: u32,
+    pub(crate) finger_calibrated: u32,
     /// The drift that it expects; `null` in a table of properties.
-    pub drift: Option<Drift>,
+    drift: Option<Drift>,
     /// The share of false alarms that its limits are for; `null` where it has none.
-    pub false_alarm: Option<f32>,
+    false_alarm: Option<f32>,
     /// Lengths of shorter slides that it has statistics of, s at constant speed.
-    pub lengths_s: Vec<f64>,
-    /// The movements.
+    pub(crate) lengths_s: Vec<f64>,
+    /// Its movements, in the order of the table.
     pub movements: Vec<MovementSummary>,
     /// The textures, in the order of the table.
-    pub textures: Vec<TextureSummary>,
+    pub(super) textures: Vec<TextureSummary>,
 }
 
-/// A movement of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+/// A movement of the table.
 pub struct MovementSummary {
-    /// Contact force.
-    pub force_n: f32,
-    /// Speed.
-    pub speed_mm_s: f32,
+    force_n: f32,
+    speed_mm_s: f32,
 }
 
-/// A texture of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct TextureSummary {
-    /// Its name.
-    pub name: String,
+pub(crate) struct TextureSummary {
+    name: String,
     /// Slides from which it was learned: from the factory, from a user, and by the probe itself.
-    pub slides_factory: u32,
+    pub(crate) slides_factory: u32,
     /// See [`Self::slides_factory`].
-    pub slides_user: u32,
+    pub(crate) slides_user: u32,
     /// See [`Self::slides_factory`].
-    pub slides_itself: u32,
+    pub(crate) slides_itself: u32,
     /// True if its sample was moved or turned between trials; `null` if unknown.
-    pub sample_moved: Option<bool>,
+    sample_moved: Option<bool>,
     /// Its statistics at each movement, in the order of the movements.
-    pub movements: Vec<KnownSummary>,
+    movements: Vec<KnownSummary>,
 }
 
-/// The statistics of a texture at a movement.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct KnownSummary {
-    /// Slides it was learned from.
-    pub trials: u8,
+pub(crate) struct KnownSummary {
+    trials: u8,
     /// Mean and standard deviation; `null` where it was not learned, as in a table of whitened features.
-    pub traction_n: Option<[f32; 2]>,
+    traction_n: Option<[f32; 2]>,
     /// Mean and standard deviation of the logarithm.
-    pub roughness_ln: Option<[f32; 2]>,
+    roughness_ln: Option<[f32; 2]>,
     /// Mean and standard deviation of the logarithm.
-    pub fineness_ln: Option<[f32; 2]>,
+    pub(crate) fineness_ln: Option<[f32; 2]>,
     /// The texture that is most like it here, in a table of whitened features.
-    pub nearest: Option<String>,
+    nearest: Option<String>,
     /// Distance of the two, in standard deviations within a texture.
-    pub nearest_sd: Option<f32>,
+    pub(crate) nearest_sd: Option<f32>,
 }
 
 impl TableSummary {

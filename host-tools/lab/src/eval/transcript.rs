@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use serde::Serialize;
-use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
+use tactus_core::explorer::{ExpectedOutcome, Verdict, VerdictKind};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Table};
@@ -21,39 +21,34 @@ pub struct Transcript {
 
 /// A slide: the reason for it, its measurements, and the posterior after it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct SlideRecord {
-    /// Contact force of the movement.
-    pub force_n: Option<f32>,
-    /// Speed of the movement.
-    pub speed_mm_s: Option<f32>,
+struct SlideRecord {
+    force_n: Option<f32>,
+    speed_mm_s: Option<f32>,
     /// The one property that was looked at; `null` for all features.
-    pub property: Option<&'static str>,
+    property: Option<&'static str>,
     /// Uncertainty that was expected after it (eq. 11), 0 to 1.
-    pub expected_uncertainty: Option<f32>,
-    /// Mean traction, N.
-    pub traction_n: Option<f32>,
+    pub(crate) expected_uncertainty: Option<f32>,
+    traction_n: Option<f32>,
     /// Roughness, a logarithm.
-    pub roughness_ln: Option<f32>,
+    roughness_ln: Option<f32>,
     /// True if the surface is at most as rough as that.
-    pub roughness_is_bound: bool,
+    roughness_is_bound: bool,
     /// Fineness, a logarithm.
-    pub fineness_ln: Option<f32>,
+    pub(crate) fineness_ln: Option<f32>,
     /// End of the slide, seconds at constant speed, if it ended early.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub ended_after_s: Option<f64>,
+    pub(crate) ended_after_s: Option<f64>,
     /// The reason why the slide does not count, if it does not.
-    pub rejected: Option<String>,
+    rejected: Option<String>,
     /// The textures after the slide, the most probable first.
-    pub posterior: Vec<Candidate>,
+    posterior: Vec<Candidate>,
 }
 
-/// A texture and its posterior probability.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Candidate {
-    /// Name of the texture.
-    pub texture: String,
+struct Candidate {
+    texture: String,
     /// 0 to 1.
-    pub probability: f32,
+    probability: f32,
 }
 
 /// The verdict.
@@ -62,24 +57,23 @@ pub struct Answer {
     /// `sure`, `changed`, `new` or `undecided`.
     pub told: &'static str,
     /// The most probable texture; it is the answer with `sure`, and with `changed` if the user says so.
-    pub texture: String,
+    texture: String,
     /// Its posterior probability, 0 to 1.
-    pub probability: f32,
+    probability: f32,
     /// Log-odds that it is none of those known, where the method can tell.
-    pub log_odds: Option<f32>,
-    /// Slides that counted.
-    pub slides: u8,
+    log_odds: Option<f32>,
+    slides: u8,
 }
 
 impl Answer {
     /// A verdict in words for programs.
     pub fn new(verdict: Verdict, slides: u8, table: Table<'_>) -> Self {
         Self {
-            told: match verdict.told() {
-                Told::Sure => "sure",
-                Told::New => "new",
-                Told::Changed => "changed",
-                Told::Undecided => "undecided",
+            told: match verdict.kind() {
+                VerdictKind::Sure => "sure",
+                VerdictKind::New => "new",
+                VerdictKind::Changed => "changed",
+                VerdictKind::Undecided => "undecided",
             },
             texture: table.name(verdict.texture).unwrap_or_default().to_owned(),
             probability: verdict.probability,

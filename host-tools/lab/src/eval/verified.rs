@@ -19,8 +19,7 @@ pub struct Verified {
     pub sample: Option<String>,
     /// `same`, `different` or `unsure`.
     pub answer: &'static str,
-    /// Fewest slides of the reference at a movement.
-    pub reference_slides: u8,
+    pub(crate) reference_slides: u8,
     /// True if these are too few to rely on.
     pub few: bool,
     /// Share of the reference's own episodes that would be called different.
@@ -41,9 +40,6 @@ pub struct NoLimits;
 
 impl Verified {
     /// Before the first slide.
-    ///
-    /// # Errors
-    /// [`NoLimits`].
     pub fn new(table: Table<'_>, texture: u16, config: &Config) -> Result<Self, NoLimits> {
         let limits = table.limits().ok_or(NoLimits)?;
         let movements = 0..table.movements().len() as u8;
@@ -90,9 +86,6 @@ pub fn name(answer: Answer) -> &'static str {
 }
 
 /// Prints the state after a slide.
-///
-/// # Errors
-/// A failure to write.
 pub fn print_slide(slide: &Slide, out: &mut impl Write) -> io::Result<()> {
     let says = match slide.answer {
         "same" => "the same",
@@ -107,9 +100,6 @@ pub fn print_slide(slide: &Slide, out: &mut impl Write) -> io::Result<()> {
 }
 
 /// Prints the answer, and its error rates.
-///
-/// # Errors
-/// A failure to write.
 pub fn print_answer(v: &Verified, out: &mut impl Write) -> io::Result<()> {
     let answer = match v.answer {
         "same" => format!("The same as {}.", v.reference),

@@ -7,7 +7,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Answer, Config, Explorer, Strategy};
 use tactus_core::features::{Observation, Vector, WHITE_STEPS};
-use tactus_core::table::{Change, Contents, EncodeError, Known, Table, Tally, Whitened, amend};
+use tactus_core::table::{
+    Change, Contents, EncodeError, Table, Tally, TextureStats, Whitened, amend,
+};
 
 use crate::data::replay::MeasuredSlide;
 use crate::eval::evaluate::{EvaluateError, explorer};
@@ -16,9 +18,7 @@ use crate::eval::learn;
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
-/// Other textures that each one is compared with.
 const OTHERS: usize = 3;
-/// Points of a curve.
 const POINTS: usize = 60;
 
 /// The result of verifications.
@@ -60,12 +60,10 @@ pub struct AnswerShares {
     pub mean_slides: f64,
 }
 
-/// The comparison of the slides of one episode with one reference.
 struct Episode {
     is_same: bool,
     scores: [f64; SLIDES],
     answers: [Answer; SLIDES],
-    /// Answer and slides at the end.
     end: (Answer, usize),
 }
 
@@ -90,9 +88,6 @@ impl From<learn::TableError> for VerifyError {
 }
 
 /// Compares slides of each texture in turn with its own reference and with those of others.
-///
-/// # Errors
-/// See [`VerifyError`].
 pub fn verify(
     experiment: &Experiment,
     config: Config,
@@ -149,7 +144,6 @@ pub fn verify(
     })
 }
 
-/// Compares the slides of a run with one texture of the table.
 fn episode(
     experiment: &Experiment,
     bytes: &[u8],
@@ -275,9 +269,6 @@ pub enum PutError {
 }
 
 /// A table with one more texture, or another one of this name, that was learned from these slides.
-///
-/// # Errors
-/// See [`PutError`].
 pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec<u8>, PutError> {
     let Contents::Fused(set, length) = table.contents() else {
         return Err(PutError::NotFused);
@@ -299,7 +290,7 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     let mut bytes = vec![0; table.as_bytes().len() + MOST_OF_ONE];
     let change = Change::Put {
         name,
-        known: Known::Fused(&known),
+        known: TextureStats::Fused(&known),
         tally: Tally::default(),
     };
     let length = amend(&mut bytes, &table, change)?.as_bytes().len();
@@ -307,9 +298,7 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     Ok(bytes)
 }
 
-/// More bytes than one texture takes in a table.
 const MOST_OF_ONE: usize = 4096;
-/// Episodes that are drawn of each other texture.
 const DRAWN: usize = 40;
 
 /// Share of episodes of the table's other textures, drawn about their means and as long as that of `explorer`, that

@@ -19,39 +19,32 @@ const FRAME: usize = 512;
 /// Bins that are shown as one, of those over 0 Hz.
 const BINS: usize = 4;
 
-/// The events since the last call.
 #[derive(Default)]
-pub struct Received {
+pub(crate) struct Received {
     /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
-    pub pac: Vec<i16>,
+    pub(crate) pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
-    pub spectra: Vec<Vec<i8>>,
-    /// The probe's events.
-    pub happened: Vec<Happening>,
+    pub(crate) spectra: Vec<Vec<i8>>,
+    pub(crate) happened: Vec<Happening>,
 }
 
-/// Follows a probe's messages.
 #[derive(Default)]
-pub struct ProbeMonitor {
-    /// The table in force, and its maps.
+pub(crate) struct ProbeMonitor {
     table: Rc<[u8]>,
     planes: Vec<Plane>,
     known: KnownTable,
     followed: Followed,
     early_ms: Option<u16>,
-    /// The last samples of P_AC.
     recent: Vec<i16>,
     received: Received,
 }
 
 impl ProbeMonitor {
-    /// An exploration begins.
-    pub fn explores(&mut self, config: Config) {
+    pub(crate) fn explores(&mut self, config: Config) {
         self.followed = Followed::begin(config);
     }
 
-    /// This table is in force.
-    pub fn knows(&mut self, bytes: &[u8]) {
+    pub(crate) fn knows(&mut self, bytes: &[u8]) {
         if *self.table == *bytes {
             return;
         }
@@ -81,13 +74,11 @@ impl ProbeMonitor {
         };
     }
 
-    /// The probe's textures and movements.
-    pub fn known(&self) -> &KnownTable {
+    pub(crate) fn known(&self) -> &KnownTable {
         &self.known
     }
 
-    /// Place of a slide among the textures at its movement.
-    pub fn place_of(
+    pub(crate) fn place_of(
         &self,
         table: Table<'_>,
         movement: u8,
@@ -98,18 +89,15 @@ impl ProbeMonitor {
         Some(plane.place(&distances))
     }
 
-    /// Adds an event of the probe.
-    pub fn happens(&mut self, what: Happening) {
+    pub(crate) fn happens(&mut self, what: Happening) {
         self.received.happened.push(what);
     }
 
-    /// Takes the events since the last call.
-    pub fn take(&mut self) -> Received {
+    pub(crate) fn take(&mut self) -> Received {
         std::mem::take(&mut self.received)
     }
 
-    /// Takes a message of the probe.
-    pub fn hear(&mut self, event: Event) {
+    pub(crate) fn hear(&mut self, event: Event) {
         if let Event::Block(block) = &event {
             self.block(block);
             return;
@@ -219,20 +207,13 @@ impl ProbeMonitor {
     }
 
     /// A texture was learned, and the table is this one now.
-    pub fn learned(&mut self) {
+    pub(crate) fn learned(&mut self) {
         for happening in &mut self.received.happened {
             if let Happening::Learned { known, .. } = happening {
                 known.clone_from(&self.known);
             }
         }
     }
-}
-
-/// The spectra of samples from their first on, as those of [`Received`].
-pub fn spectra(pac: &[i16]) -> Vec<Vec<i8>> {
-    let ends = (1..=pac.len() / BLOCK).map(|block| block * BLOCK);
-    let before = |end: usize| pac.get(end.saturating_sub(FRAME)..end);
-    ends.filter_map(|end| spectrum(before(end)?)).collect()
 }
 
 /// The power of these samples, dB per four bins.

@@ -13,20 +13,15 @@ use crate::sim::probe::Host;
 use crate::sim::rig::SimRig;
 use tactus_world::world::Truth;
 
-/// P_DC is shown so often, ms.
 const PDC_MS: u64 = 10;
 
-/// The work in progress, and the events since the last frame.
 pub(super) struct Scene {
     /// The time at which it stands still; `None`: it does not.
     pub(super) until: Option<Duration>,
-    /// True if a request waits for it to continue.
     pub(super) waits: Cell<bool>,
-    /// Changes of the rig before its next millisecond.
     texture: Option<u8>,
     pub(super) wear: Option<f64>,
     pub(super) stop: bool,
-    /// The probe's messages.
     pub(super) monitor: ProbeMonitor,
     now: Duration,
     phase: Phase,
@@ -52,12 +47,10 @@ impl Scene {
         }
     }
 
-    /// The time of the rig.
     pub(super) fn now(&self) -> Duration {
         self.now
     }
 
-    /// Number of the texture under the finger.
     pub(super) fn texture(&self) -> u8 {
         self.truth.texture
     }
@@ -72,7 +65,6 @@ impl Scene {
         }
     }
 
-    /// Takes the events since the last frame.
     pub(super) fn frame(&mut self) -> Frame {
         let Truth {
             tip_mm,

@@ -8,6 +8,8 @@ use std::task::{Context, Waker};
 use std::time::Duration;
 
 use embassy_futures::yield_now;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, Slide};
 use tactus_core::probe::seams::RigHandle as _;
@@ -18,7 +20,7 @@ use tactus_core::wire::{self, Command, Identify};
 
 use super::message::{Happening, Measured, Reply, Request, Settings, movement_of};
 use super::scene::Scene;
-use super::slides::{Trials, WORLD, table};
+use super::slides::{TRIALS, Trials, WORLD, table};
 use super::standing::PLAN;
 use crate::sim::collection::{Collection, calibrated};
 use crate::sim::flash::{RamFlash, TABLE};
@@ -27,14 +29,12 @@ use crate::sim::rig::SimRig;
 use tactus_world::textures::TEXTURES;
 use tactus_world::world::Setup;
 
-/// The work of a probe for one request.
 enum Job {
     Serve(Box<Command>),
     Move(Movement, u32),
 }
 
 impl Job {
-    /// With this texture under the finger.
     fn on(self, texture: u8) -> Result<(Self, Option<u8>), &'static str> {
         if !(1..=117).contains(&texture) {
             return Err("textures have the numbers 1 to 117");
@@ -43,10 +43,8 @@ impl Job {
     }
 }
 
-/// The job that waits for its turn.
 type Desk = Rc<RefCell<Option<(Job, Option<u8>)>>>;
 
-/// A world in the making.
 struct Preparing {
     settings: Settings,
     collection: Collection,
@@ -54,7 +52,6 @@ struct Preparing {
     trials: Vec<Trials>,
 }
 
-/// A probe in its world.
 struct Running {
     paper: bool,
     scene: Rc<RefCell<Scene>>,
@@ -72,17 +69,14 @@ pub struct Session {
 type Answered = Result<Reply, Box<dyn std::error::Error>>;
 
 impl Session {
-    /// Carries out a request in JSON: a [`Request`], and a [`Reply`].
+    /// Carries out a request in JSON, and replies in JSON: see `live/message.rs`.
     pub fn ask(&mut self, request: &str) -> String {
-        let reply = match serde_json::from_str(request) {
+        asked_in_json(request, |request| match request {
             Ok(request) => self.answer(request).unwrap_or_else(|why| Reply::Error {
                 why: sentence(why.as_ref()),
             }),
-            Err(why) => Reply::Error {
-                why: format!("no request: {why}"),
-            },
-        };
-        serde_json::to_string(&reply).unwrap_or_default()
+            Err(why) => Reply::Error { why },
+        })
     }
 
     fn answer(&mut self, request: Request) -> Answered {
@@ -161,7 +155,7 @@ impl Session {
         let collection = Collection {
             seed: settings.world,
             textures: Collection::spread(1, settings.textures),
-            trials: super::TRIALS,
+            trials: TRIALS,
         };
         let trials = if settings.world == WORLD {
             let mut all = Trials::of_world()?;
@@ -252,8 +246,16 @@ fn shimmed(setup: Setup) -> Setup {
     }
 }
 
-/// An error with its causes.
-pub fn sentence(why: &dyn std::error::Error) -> String {
+pub(crate) fn asked_in_json<Q: DeserializeOwned, R: Serialize>(
+    request: &str,
+    answer: impl FnOnce(Result<Q, String>) -> R,
+) -> String {
+    let request = serde_json::from_str(request);
+    let reply = answer(request.map_err(|why| format!("no request: {why}")));
+    serde_json::to_string(&reply).unwrap_or_default()
+}
+
+pub(crate) fn sentence(why: &dyn std::error::Error) -> String {
     let mut sentence = why.to_string();
     let mut cause = why.source();
     while let Some(deeper) = cause {
@@ -270,7 +272,6 @@ impl Running {
         Ok(Reply::Frame(self.scene.borrow_mut().frame()))
     }
 
-    /// So much time passes, at most.
     fn go_on(&mut self, ms: u32) {
         {
             let mut scene = self.scene.borrow_mut();
@@ -295,7 +296,6 @@ impl Running {
     }
 }
 
-/// The life of a probe: it waits for jobs and does them.
 async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: Desk) {
     let mut buffer = vec![0; TABLE];
     let on = switch_on(rig, RamFlash::blank(), &factory, &mut buffer, &PLAN, &scene);
@@ -352,7 +352,6 @@ async fn live(rig: SimRig, factory: Vec<u8>, scene: Rc<RefCell<Scene>>, desk: De
     }
 }
 
-/// One movement.
 async fn make<'p>(
     probe: &mut SimProbe<'p, Scene>,
     scene: &RefCell<Scene>,

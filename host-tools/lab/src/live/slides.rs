@@ -13,25 +13,22 @@ use crate::eval::learn::{Expected, ObservedTrial, TableError, learn_lengths, nam
 use crate::sim::collection::{Collection, TrialError, record_texture, texture_name};
 
 /// The world whose trials come with the program: that of the firmware's table.
-pub const WORLD: u64 = 1;
-/// Trials of each texture and movement.
-pub const TRIALS: u32 = 5;
+pub(crate) const WORLD: u64 = 1;
+pub(crate) const TRIALS: u32 = 5;
 
-/// The trials of one texture.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Trials {
-    /// Its number in Table 1.
-    pub texture: u8,
+pub(crate) struct Trials {
+    pub(crate) texture: u8,
     /// Per movement of [`Collection::MOVEMENTS`].
-    pub movements: Vec<Vec<ObservedTrial>>,
+    pub(crate) movements: Vec<Vec<ObservedTrial>>,
 }
 
 impl Trials {
-    /// Has the rig of a world make them.
-    ///
-    /// # Errors
-    /// The first fault of the rig, or slide without properties.
-    pub fn make(world: u64, texture: u8, calibration: RigCalibration) -> Result<Self, TrialError> {
+    pub(crate) fn make(
+        world: u64,
+        texture: u8,
+        calibration: RigCalibration,
+    ) -> Result<Self, TrialError> {
         let collection = Collection {
             seed: world,
             textures: vec![texture],
@@ -54,15 +51,11 @@ impl Trials {
     }
 
     /// All textures of [`WORLD`], as they were made before.
-    ///
-    /// # Errors
-    /// The file that comes with the program is not of this version; a test looks.
-    pub fn of_world() -> Result<Vec<Self>, postcard::Error> {
+    pub(crate) fn of_world() -> Result<Vec<Self>, postcard::Error> {
         postcard::from_bytes(made_before())
     }
 }
 
-/// Those of [`WORLD`] that came from outside.
 static BROUGHT: OnceLock<Vec<u8>> = OnceLock::new();
 /// Those that are in the program; in a page they lie beside the module, which is small then.
 const BUILT_IN: &[u8] = if cfg!(target_family = "wasm") {
@@ -81,29 +74,7 @@ pub fn bring_world(trials: Vec<u8>) {
     let _ = BROUGHT.set(trials);
 }
 
-/// Reasons why the table of the world that comes with the program is missing.
-#[derive(Debug, thiserror::Error)]
-pub enum WorldError {
-    /// Its trials are of another version.
-    #[error(transparent)]
-    Trials(#[from] postcard::Error),
-    /// They make no table.
-    #[error(transparent)]
-    Table(#[from] TableError),
-}
-
-/// The table of all textures of [`WORLD`], of all features.
-///
-/// # Errors
-/// Contents that come with the program are not of this version.
-pub fn world_table() -> Result<Vec<u8>, WorldError> {
-    Ok(table(&Trials::of_world()?, false, 1.0)?)
-}
-
 /// The table that these trials make, for the fused method or the paper's.
-///
-/// # Errors
-/// See [`TableError`].
 pub(super) fn table(trials: &[Trials], paper: bool, drift: f32) -> Result<Vec<u8>, TableError> {
     let usual = Drift::default();
     let expected = Expected {

@@ -9,25 +9,21 @@ use tactus_core::features::{Block, Movement, Observation, PropertySet, Slide};
 use tactus_core::sensor::pressure::samples_in;
 use tactus_core::table::{Action, MAX_TEXTURES, Table};
 
-/// Coefficients and angles, for all slides.
 pub(super) static PLAN: LazyLock<Plan> = LazyLock::new(Plan::new);
 
-/// The posterior, with the checks for new and changed textures.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Standing {
-    /// Probability of each texture of the table.
-    pub posterior: Vec<f32>,
+pub(crate) struct Standing {
+    pub(crate) posterior: Vec<f32>,
     /// Excess of the slides' distance from all textures over its limit, if the table has one; above 0: new.
-    pub log_odds: Option<f32>,
+    pub(crate) log_odds: Option<f32>,
     /// True if they differ from the most probable one as that was learned.
-    pub changed: bool,
+    pub(crate) changed: bool,
     /// Excess of their distance from all textures as learned over its limit; above 0: changed, or new.
-    pub changed_by: Option<f32>,
+    pub(crate) changed_by: Option<f32>,
 }
 
 impl Standing {
-    /// As an explorer has it.
-    pub fn of<const N: usize>(explorer: &Explorer<'_, N>) -> Self {
+    pub(crate) fn of<const N: usize>(explorer: &Explorer<'_, N>) -> Self {
         Self {
             posterior: explorer.posterior().to_vec(),
             log_odds: explorer.log_odds(),
@@ -43,13 +39,11 @@ pub(super) struct Followed {
     config: Config,
     action: Option<Action>,
     slide: Option<Slide<'static>>,
-    /// Lengths that the slide has reached.
     reached: usize,
     observed: Vec<(Action, Observation)>,
 }
 
 impl Followed {
-    /// A new exploration.
     pub(super) fn begin(config: Config) -> Self {
         Self {
             config,
@@ -57,14 +51,12 @@ impl Followed {
         }
     }
 
-    /// A slide begins.
     pub(super) fn chosen(&mut self, action: Action, movement: Movement) {
         self.action = Some(action);
         self.slide = Some(Slide::new(&PLAN, movement));
         self.reached = 0;
     }
 
-    /// The movement of the slide.
     pub(super) fn movement(&self) -> Option<u8> {
         self.action.map(|action| action.movement)
     }
@@ -87,12 +79,10 @@ impl Followed {
         Some((ms, Observation::from(&slide.look(wanted).ok()?)))
     }
 
-    /// The posterior if the slide had ended at the length that it has reached.
     pub(super) fn so_far(&self, table: Table<'_>, seen: &Observation) -> Option<Standing> {
         self.standing(table, Some((self.action?, self.reached as u8, seen)))
     }
 
-    /// The slide has ended; returns the posterior.
     pub(super) fn observed(
         &mut self,
         table: Table<'_>,

@@ -1,10 +1,9 @@
-use super::{TRIALS, Trials, WORLD};
+use super::slides::{TRIALS, Trials, WORLD};
 use crate::sim::collection::{Collection, calibrated};
 use tactus_world::textures::TEXTURES;
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/live/world-1.trials");
 
-/// `TACTUS_TRIALS=write` makes the file anew.
 #[test]
 fn the_trials_that_come_with_the_program_are_what_the_world_gives() {
     let world = Collection {

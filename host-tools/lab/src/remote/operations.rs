@@ -1,10 +1,9 @@
-//! Operations on a probe that take a laboratory: its slides are held against a table here, or become recordings. The
-//! others are
-//! those of [`link::operations`](tactus_link::operations).
+//! Operations on a probe whose slides are compared with a table here, or recorded. The others are those of
+//! [`link::operations`](tactus_link::operations).
 
 use std::io::{self, Write as _};
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use tactus_core::explorer::{Strategy, Verdict};
 use tactus_core::table::{Contents, Table};
 use tactus_core::wire::{Command, Event, Identify, Report, Status};
@@ -14,9 +13,7 @@ use super::verifying::{Verifying, config_of};
 use crate::data::recorder::{RecordError, Recorder};
 use crate::data::recording::{Labels, Recording};
 use crate::eval::alike::{self, Alike};
-use crate::eval::refresh::{
-    Moved, NewSlide, Pair, RefreshError, Refreshed, refresh as moved_table,
-};
+use crate::eval::refresh::{NewSlide, Refreshed, refresh as moved_table};
 use crate::eval::samples::Trials;
 use crate::eval::show::Show;
 use crate::eval::verified::{Verified, print_answer, print_slide};
@@ -82,8 +79,7 @@ pub async fn verify(probe: &Probe, texture: u16, wanted: Identify) -> Result<Ver
         strategy: Strategy::Cycling,
         ..wanted
     };
-    let verifying = Verifying::new(&bytes, texture, config_of(&wanted));
-    let mut verifying = verifying.map_err(OperationError::said)?;
+    let mut verifying = Verifying::new(&bytes, texture, config_of(&wanted))?;
     let (mut prompts, mut words) = (Prompts::default(), probe.words());
     writeln!(words, "Is it {}?", verifying.reference())?;
     let request = Request::command(Command::Verify(wanted));
@@ -127,7 +123,7 @@ pub struct Recorded {
 
 impl Recorded {
     /// The slides with what is known of each, beside what is known of all.
-    pub fn labelled(&self, labels: &Labels) -> Vec<(Recording, Labels)> {
+    pub(crate) fn labelled(&self, labels: &Labels) -> Vec<(Recording, Labels)> {
         let slides = self.slides.iter().map(|(slide, moved)| {
             let labels = Labels {
                 finger: self.status.finger,
@@ -198,29 +194,13 @@ pub async fn record(probe: &Probe, wanted: &Wanted) -> Result<Recorded> {
     })
 }
 
-/// The table of a probe after its skin or finger was replaced.
-#[derive(Debug, Serialize)]
-pub struct RefreshedProbe {
-    /// Slides that it goes by.
-    pub slides: usize,
-    /// The way of all textures together, standard deviations of a slide.
-    pub together: f64,
-    /// The way of each beyond that.
-    pub moved: Vec<Moved>,
-    /// Textures without a new slide.
-    pub left_out: Vec<String>,
-    /// Pairs that cannot be told apart now.
-    pub alike: Vec<Pair>,
-    /// Checksum of the table in use; CRC-32, hexadecimal.
-    pub checksum: String,
-}
-
 /// Has the probe slide over every texture once at each movement, and moves its table, with somebody's consent.
-pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedProbe> {
+pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<()> {
     let bytes = probe.table().await?;
     let table = Table::read(&bytes)?;
     if !matches!(table.contents(), Contents::Fused(..)) {
-        return Err(OperationError::said(RefreshError::NotFused));
+        // it says why, before anybody has laid a sample there
+        moved_table(table, &[]).map_err(OperationError::said)?;
     }
     let (mut slides, mut left_out, mut words) = (Vec::new(), Vec::new(), probe.words());
     for (texture, name) in (0..).zip(table.names()) {
@@ -232,28 +212,13 @@ pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedP
         writeln!(words, "{name}: {}", count(made.len() as u64, "slide"))?;
         slides.extend(made);
     }
-    let Refreshed {
-        bytes: new,
-        together,
-        moved,
-        alike,
-    } = moved_table(table, &slides).map_err(OperationError::said)?;
-    let mut refreshed = RefreshedProbe {
-        slides: slides.len(),
-        together,
-        moved,
-        left_out,
-        alike,
-        checksum: String::new(),
-    };
-    refreshed.print(&mut words)?;
+    let refreshed = moved_table(table, &slides).map_err(OperationError::said)?;
+    print_refreshed(&refreshed, &left_out, &mut words)?;
     let lost = "The probe is to use the table that has moved.";
-    let status = operations::replace_table(probe, &new, lost, "refresh again").await?;
-    refreshed.checksum = format!("{:08x}", status.table_crc);
-    Ok(refreshed)
+    operations::replace_table(probe, &refreshed.bytes, lost, "refresh again").await?;
+    Ok(())
 }
 
-/// One slide of a texture at each movement.
 async fn slides_of(
     probe: &Probe,
     table: Table<'_>,
@@ -292,29 +257,31 @@ async fn slides_of(
     Ok(made)
 }
 
-impl RefreshedProbe {
-    fn print(&self, out: &mut impl io::Write) -> io::Result<()> {
-        let together = self.together;
+fn print_refreshed(
+    refreshed: &Refreshed,
+    left_out: &[String],
+    out: &mut impl io::Write,
+) -> io::Result<()> {
+    let together = refreshed.together;
+    writeln!(
+        out,
+        "All textures moved together by {together:.1} standard deviations of a slide."
+    )?;
+    let most = refreshed.moved.iter().take(NAMED);
+    let most = most.map(|m| format!("{} ({:.1})", m.texture, m.moved));
+    let most = most.collect::<Vec<_>>().join(", ");
+    writeln!(out, "Beyond that moved most: {most}.")?;
+    if !left_out.is_empty() {
+        let all = left_out.join(", ");
         writeln!(
             out,
-            "All textures moved together by {together:.1} standard deviations of a slide."
+            "Moved with the others only, as they were left out: {all}."
         )?;
-        let most = self.moved.iter().take(NAMED);
-        let most = most.map(|m| format!("{} ({:.1})", m.texture, m.moved));
-        let most = most.collect::<Vec<_>>().join(", ");
-        writeln!(out, "Beyond that moved most: {most}.")?;
-        if !self.left_out.is_empty() {
-            let all = self.left_out.join(", ");
-            writeln!(
-                out,
-                "Moved with the others only, as they were left out: {all}."
-            )?;
-        }
-        for pair in &self.alike {
-            let since = if pair.before { "as before" } else { "any more" };
-            let (first, second) = (&pair.first, &pair.second);
-            writeln!(out, "{first} and {second} cannot be told apart {since}.")?;
-        }
-        Ok(())
     }
+    for pair in &refreshed.alike {
+        let since = if pair.before { "as before" } else { "any more" };
+        let (first, second) = (&pair.first, &pair.second);
+        writeln!(out, "{first} and {second} cannot be told apart {since}.")?;
+    }
+    Ok(())
 }

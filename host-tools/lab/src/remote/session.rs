@@ -11,14 +11,10 @@ use std::time::Duration;
 use embassy_futures::yield_now;
 use tactus_core::wire::{Event, Live, Phase, Report};
 
+use super::heard::Heard;
 use super::message::{File, Frame, Question, Reply, Request, Work};
-#[cfg(feature = "open")]
-use super::open::open;
-#[cfg(feature = "open")]
-use super::recorded::{Opened, Recorded};
-use super::replay::Replay;
 use super::work::{Kept, work};
-use crate::live::sentence;
+use crate::live::{asked_in_json, sentence};
 use tactus_link::log::Line;
 use tactus_link::person::{self, QuestionKind};
 use tactus_link::probe::{GREETING, TIMEOUT};
@@ -42,14 +38,13 @@ impl Desk {
     }
 }
 
-/// A probe that somebody works with.
 struct Open {
     probe: Probe,
     desk: Rc<RefCell<Desk>>,
     kept: Rc<RefCell<Kept>>,
     life: Pin<Box<dyn Future<Output = ()>>>,
     log: Vec<u8>,
-    heard: Replay,
+    heard: Heard,
     live: Option<Live>,
     phase: Option<Phase>,
 }
@@ -58,42 +53,25 @@ struct Open {
 #[derive(Default)]
 pub struct Remote {
     open: Option<Open>,
-    #[cfg(feature = "open")]
-    given: Vec<Vec<u8>>,
-    #[cfg(feature = "open")]
-    recorded: Option<Recorded>,
 }
 
 type Answered = Result<Frame, Box<dyn std::error::Error>>;
 
 impl Remote {
-    /// Takes the bytes of a file, which [`Request::Open`] names then.
-    #[cfg(feature = "open")]
-    pub fn give(&mut self, bytes: Vec<u8>) {
-        self.given.push(bytes);
-    }
-
-    /// Does what is asked for, in JSON: a [`Request`], and a [`Reply`].
+    /// Carries out a request in JSON, and replies in JSON.
     pub fn ask(&mut self, request: &str) -> String {
-        let reply = match serde_json::from_str(request) {
-            Ok(request) => self.answer(request).map_or_else(
-                |why| Reply::Error {
+        asked_in_json(request, |request| match request {
+            Ok(request) => match self.answer(request) {
+                Ok(frame) => Reply::Frame(frame),
+                Err(why) => Reply::Error {
                     why: sentence(why.as_ref()),
                 },
-                Reply::Frame,
-            ),
-            Err(why) => Reply::Error {
-                why: format!("no request: {why}"),
             },
-        };
-        serde_json::to_string(&reply).unwrap_or_default()
+            Err(why) => Reply::Error { why },
+        })
     }
 
-    /// Does what is asked for.
-    ///
-    /// # Errors
-    /// It makes no sense now.
-    pub fn answer(&mut self, request: Request) -> Answered {
+    fn answer(&mut self, request: Request) -> Answered {
         match request {
             Request::Connect { port, now_ms } => {
                 let open = self.open.insert(Open::new(&port)?);
@@ -158,25 +136,6 @@ impl Remote {
                 });
                 Ok(frame)
             }
-            #[cfg(feature = "open")]
-            Request::Open { files } => {
-                let given = std::mem::take(&mut self.given);
-                let files = files.into_iter().zip(given);
-                let files = files.map(|(name, bytes)| File { name, bytes }).collect();
-                self.recorded = None;
-                Ok(match open(files)? {
-                    Opened::Session(frame) => frame,
-                    Opened::Recordings(recorded) => self.recorded.insert(recorded).show(),
-                })
-            }
-            #[cfg(feature = "open")]
-            Request::Recorded { at } => {
-                let streams = self.recorded.as_ref().and_then(|all| all.streams(at));
-                Ok(Frame {
-                    streams: Some(streams.ok_or("there is no such slide")?),
-                    ..Frame::default()
-                })
-            }
         }
     }
 
@@ -199,7 +158,7 @@ impl Open {
             desk,
             kept,
             log,
-            heard: Replay::live(),
+            heard: Heard::default(),
             live: None,
             phase: None,
         })
@@ -226,16 +185,15 @@ impl Open {
         }
     }
 
-    /// Everything since the last one.
     fn frame(&mut self) -> Answered {
         for line in self.probe.said() {
             line.write(&mut self.log)?;
             if let Line::Report(report) = &line {
                 self.hear(report);
             }
-            self.heard.hear(line);
+            self.heard.hear(&line);
         }
-        let heard = self.heard.frame();
+        let (received, known) = self.heard.take();
         let of = |value: fn(&Live) -> i32| {
             let live = self.live.as_ref();
             live.map_or(0.0, |live| f64::from(value(live)) * 1e-3)
@@ -249,19 +207,20 @@ impl Open {
             force_n: of(|live| live.force_mn.into()),
             stage_mm: of(|live| live.stage_um),
             speed_mm_s: of(|live| live.speed_um_s),
-            known: heard.tables.into_iter().last().map(|(_, known)| known),
-            tables: Vec::new(),
+            at_ms: self.heard.at_ms,
+            pac: received.pac,
+            spectra: received.spectra,
+            happened: received.happened,
+            known,
             said: String::from_utf8_lossy(&self.probe.take_words()).into_owned(),
             failed: desk.failed.take(),
             question: self.probe.question().map(Question::from),
             files: std::mem::take(&mut kept.files),
             folders: std::mem::take(&mut kept.folders),
-            ..heard
         })
     }
 }
 
-/// Works with a probe for as long as there is a line.
 async fn live(probe: Probe, desk: Rc<RefCell<Desk>>, kept: Rc<RefCell<Kept>>) {
     let greeted = work(&probe, Work::Status, &kept).await;
     desk.borrow_mut().connected = greeted.is_ok();

@@ -1,38 +1,23 @@
 //! A verification of the probe, held against the other textures of its table here.
 
-use tactus_core::explorer::{Config, Explorer, ExplorerError, Method, Strategy};
+use tactus_core::explorer::{Config, Explorer, Method, Strategy};
 use tactus_core::features::{Movement, PropertySet};
-use tactus_core::table::{MAX_TEXTURES, Table, TableError};
+use tactus_core::table::{MAX_TEXTURES, Table};
 use tactus_core::wire::{Event, Identify};
 
-use crate::eval::verified::{NoLimits, Slide, Verified, name};
+use crate::eval::verified::{Slide, Verified, name};
 use crate::eval::verify::false_accept;
+use tactus_link::OperationError;
 
-/// A verification under way.
-pub struct Verifying<'t> {
+pub(super) struct Verifying<'t> {
     verified: Verified,
     texture: u16,
-    /// what the probe says of its slides, held against the other textures here
+    /// the probe's slides, compared with the other textures
     here: Box<Explorer<'t, MAX_TEXTURES>>,
     movement: Option<Movement>,
 }
 
-/// Why a probe's table verifies nothing.
-#[derive(Debug, thiserror::Error)]
-pub enum NoReference {
-    /// It has no limits.
-    #[error(transparent)]
-    Limits(#[from] NoLimits),
-    /// It does not read.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// It cannot be explored.
-    #[error(transparent)]
-    Explorer(#[from] ExplorerError),
-}
-
-/// How a probe verifies that is asked like this.
-pub fn config_of(asked: &Identify) -> Config {
+pub(super) fn config_of(asked: &Identify) -> Config {
     Config {
         method: Method::Fused,
         strategy: Strategy::Cycling,
@@ -45,27 +30,27 @@ pub fn config_of(asked: &Identify) -> Config {
 }
 
 impl<'t> Verifying<'t> {
-    /// Before the first slide: the reference is this texture of the table.
-    ///
-    /// # Errors
-    /// The table cannot say what is the same.
-    pub fn new(bytes: &'t [u8], texture: u16, config: Config) -> Result<Self, NoReference> {
+    pub(super) fn new(
+        bytes: &'t [u8],
+        texture: u16,
+        config: Config,
+    ) -> Result<Self, OperationError> {
         let table = Table::read(bytes)?;
+        let here = Explorer::among(table, PropertySet::ALL, config, [texture]);
         Ok(Self {
-            verified: Verified::new(table, texture, &config)?,
+            verified: Verified::new(table, texture, &config).map_err(OperationError::said)?,
             texture,
-            here: Box::new(Explorer::among(table, PropertySet::ALL, config, [texture])?),
+            here: Box::new(here.map_err(OperationError::said)?),
             movement: None,
         })
     }
 
-    /// The texture that it may be.
-    pub fn reference(&self) -> &str {
+    pub(super) fn reference(&self) -> &str {
         &self.verified.reference
     }
 
     /// Takes in what the probe says; the slide that was judged with it.
-    pub fn hear(&mut self, event: &Event) -> Option<&Slide> {
+    pub(super) fn hear(&mut self, event: &Event) -> Option<&Slide> {
         match event {
             Event::Chosen { movement, .. } => self.movement = Some(*movement),
             Event::SlideReport {
@@ -92,14 +77,12 @@ impl<'t> Verifying<'t> {
         None
     }
 
-    /// The answer, and what it is worth.
-    pub fn end(mut self) -> Verified {
+    pub(super) fn end(mut self) -> Verified {
         self.verified.false_accept = false_accept(&self.here, self.texture);
         self.verified
     }
 }
 
-/// What is printed, without what is around it.
 pub(super) fn words(print: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
     let mut out = Vec::new();
     // memory takes it

@@ -16,7 +16,6 @@ use tactus_link::{OperationError, Probe, say};
 
 type Result<T> = std::result::Result<T, OperationError>;
 
-/// Files and folders that a page keeps.
 #[derive(Default)]
 pub(super) struct Kept {
     pub(super) files: Vec<File>,

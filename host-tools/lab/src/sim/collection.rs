@@ -53,9 +53,7 @@ impl Collection {
     }
 
     /// Begins a folder of recordings of it, or continues one that was interrupted.
-    ///
-    /// # Errors
-    /// The folder cannot be written, or holds other recordings.
+    /// Errors: the folder cannot be written, or holds other recordings.
     pub fn writer(
         &self,
         folder: &Path,
@@ -116,9 +114,7 @@ impl Collection {
 
     /// Records all trials of all textures, textures side by side; `done` is called after each. Returns the slides of
     /// each texture in the order of time.
-    ///
-    /// # Errors
-    /// The first fault of a rig.
+    /// Errors: the first fault of a rig.
     pub fn record(
         &self,
         calibration: RigCalibration,
@@ -128,9 +124,7 @@ impl Collection {
     }
 
     /// The same with another finger than a BioTac.
-    ///
-    /// # Errors
-    /// The first fault of a rig.
+    /// Errors: the first fault of a rig.
     pub fn record_with(
         &self,
         finger: FingerName,
@@ -162,74 +156,49 @@ impl Collection {
             .collect()
     }
 
-    /// Learns a texture table for a method from trials of all textures.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
+    /// Learns a texture table for a method from trials of all textures with a BioTac, at the movements of the study.
     pub fn learn(
         &self,
         method: Method,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
-        self.learn_at(&Self::MOVEMENTS, method, calibration, done)
+        let movements = &Self::MOVEMENTS;
+        self.learn_with(
+            FingerName::Biotac,
+            movements,
+            (method, None),
+            calibration,
+            done,
+        )
     }
 
-    /// As [`Collection::learn`], of these movements.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
-    pub fn learn_at(
-        &self,
-        movements: &[Movement],
-        method: Method,
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<u8>, LearnError> {
-        self.learn_with(FingerName::Biotac, movements, method, calibration, done)
-    }
-
-    /// The same with another finger than a BioTac.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
+    /// The same with any finger and movements; the fused method learns these features, or the best there are. Band
+    /// powers alone are for a rig that does not measure shear, as one that an arm moves.
     pub fn learn_with(
         &self,
         finger: FingerName,
         movements: &[Movement],
-        method: Method,
+        (method, features): (Method, Option<FeatureSet>),
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
         let slides = self.record_at(finger, movements, calibration, done)?;
-        let table = self.learn_from(movements, method, &slides)?;
+        let trials = self.observe_all(movements, &slides, &[])?;
+        let whole =
+            |cell: &Vec<ObservedTrial>| cell.iter().map(|trial| trial.whole.clone()).collect();
+        let slides: Vec<Vec<Vec<Observation>>> = trials
+            .iter()
+            .map(|cells| cells.iter().map(whole).collect())
+            .collect();
+        let table = learn::learn(method, features, &self.names(), movements, &slides)?;
         let named = learn::name_finger(&table, FingerCode::of(finger), 0);
-        Ok(named.map_err(TableError::from)?)
-    }
-
-    /// A fused table for a rig that does not measure shear, as one that an arm moves: of band powers alone.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
-    pub fn learn_without_shear(
-        &self,
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<u8>, LearnError> {
-        let movements = &Self::MOVEMENTS;
-        let slides = self.record(calibration, done)?;
-        let measured = self.measure(movements, &slides)?;
-        let bands = Some(FeatureSet::Bands);
-        let table = learn::learn(Method::Fused, bands, &self.names(), movements, &measured)?;
-        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
         Ok(named.map_err(TableError::from)?)
     }
 
     /// As [`Collection::learn`], with statistics of slides after each of these lengths, in ms at constant speed, the
     /// shortest first.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties; lengths that no table has.
+    /// Errors: the first fault of a rig, or slide without properties; lengths that no table has.
     pub fn learn_lengths(
         &self,
         method: Method,
@@ -238,11 +207,7 @@ impl Collection {
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
         let slides = self.record(calibration, done)?;
-        let plan = Plan::new();
-        let trials = slides.iter().zip(&self.textures).map(|(slides, &texture)| {
-            self.observe(&plan, &Self::MOVEMENTS, texture, slides, lengths_ms)
-        });
-        let trials = trials.collect::<Result<Vec<_>, TrialError>>()?;
+        let trials = self.observe_all(&Self::MOVEMENTS, &slides, lengths_ms)?;
         let usual = Expected::default();
         let (names, movements) = (self.names(), &Self::MOVEMENTS);
         let table = learn::learn_lengths(&usual, method, &names, movements, lengths_ms, &trials)?;
@@ -252,9 +217,6 @@ impl Collection {
 
     /// The features of the slides of a texture, whole and after each of these lengths, in ms at constant speed:
     /// movement by movement.
-    ///
-    /// # Errors
-    /// [`TrialError::Slide`].
     pub fn observe(
         &self,
         plan: &Plan,
@@ -285,40 +247,17 @@ impl Collection {
         movements.iter().map(of_movement).collect()
     }
 
-    /// The table of these slides, each texture's in the order of time.
-    fn learn_from(
-        &self,
-        movements: &[Movement],
-        method: Method,
-        slides: &[Vec<Recording>],
-    ) -> Result<Vec<u8>, LearnError> {
-        let measured = self.measure(movements, slides)?;
-        Ok(learn::learn(
-            method,
-            None,
-            &self.names(),
-            movements,
-            &measured,
-        )?)
-    }
-
-    /// The features of these slides: of each texture, of each movement, of each trial.
-    fn measure(
+    fn observe_all(
         &self,
         movements: &[Movement],
         slides: &[Vec<Recording>],
-    ) -> Result<Vec<Vec<Vec<Observation>>>, TrialError> {
+        lengths_ms: &[u16],
+    ) -> Result<Vec<Vec<Vec<ObservedTrial>>>, TrialError> {
         let plan = Plan::new();
-        let whole = |slides: Vec<Vec<ObservedTrial>>| -> Vec<Vec<Observation>> {
-            let cells = slides.into_iter();
-            let whole = |cell: Vec<ObservedTrial>| cell.into_iter().map(|trial| trial.whole);
-            cells.map(|cell| whole(cell).collect()).collect()
-        };
-        let measured = slides.iter().zip(&self.textures).map(|(slides, &texture)| {
-            self.observe(&plan, movements, texture, slides, &[])
-                .map(whole)
-        });
-        measured.collect()
+        let textures = slides.iter().zip(&self.textures);
+        textures
+            .map(|(slides, &texture)| self.observe(&plan, movements, texture, slides, lengths_ms))
+            .collect()
     }
 }
 
@@ -335,17 +274,11 @@ pub struct Trial {
 
 impl Trial {
     /// Adds the place of this trial to an error of the rig.
-    ///
-    /// # Errors
-    /// [`TrialError::Rig`].
     pub fn made<T>(self, made: Result<T, SimError>) -> Result<T, TrialError> {
         made.map_err(|source| TrialError::Rig { at: self, source })
     }
 
     /// The features of a slide of this trial.
-    ///
-    /// # Errors
-    /// [`TrialError::Slide`].
     pub fn measure(self, plan: &Plan, slide: &Recording) -> Result<Observation, TrialError> {
         let measured =
             measure(plan, slide).map_err(|source| TrialError::Slide { at: self, source })?;
@@ -437,9 +370,6 @@ pub fn texture_number(name: &str) -> Option<u8> {
 }
 
 /// Measures the unloaded current of the rig of a world once; all rigs of that world have the same motor.
-///
-/// # Errors
-/// See [`SimError`].
 pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
     let mut rig = SimRig::new(setup);
     rig.home()?;
@@ -447,9 +377,6 @@ pub fn calibrated(setup: Setup) -> Result<RigCalibration, SimError> {
 }
 
 /// Trials of one texture at every movement, movement by movement, numbered in the order of time.
-///
-/// # Errors
-/// See [`TrialError`].
 pub fn record_texture(
     setup: Setup,
     calibration: RigCalibration,
@@ -491,9 +418,6 @@ pub enum Next {
 
 /// Powers up a rig and makes trials of the texture under it, movement by movement; `each` gets every slide, or the
 /// reason why the rig did not make it, and returns the next step.
-///
-/// # Errors
-/// See [`TrialError`], and the errors of `each`.
 pub fn record_trials(
     rig: &mut SimRig,
     at: Trial,
@@ -522,57 +446,4 @@ pub fn record_trials(
 }
 
 #[cfg(test)]
-mod hard_worlds;
-
-#[cfg(test)]
-mod tests {
-    use tactus_core::table::{Contents, Table, factory};
-
-    use super::*;
-
-    /// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this
-    /// simulator. All of each is compared by `cargo xtask campaign factory`.
-    #[test]
-    fn factory_tables_are_of_this_world() {
-        // the image of this one ends slides early
-        let lengths = Table::read(factory::RIG).unwrap();
-        assert!(lengths.lengths_ms().eq(Collection::LENGTHS_MS));
-        let plan = Plan::new();
-        for finger in FingerName::ALL {
-            let table = Table::read(factory::rig(finger)).unwrap();
-            let Contents::Fused(set, features) = table.contents() else {
-                panic!("{finger}: {:?}", table.contents());
-            };
-            let collection = Collection {
-                seed: 1,
-                textures: (1..=117).step_by(29).collect(),
-                trials: 5,
-            };
-            let calibration = calibrated(collection.setup_with(finger, 1, 0)).unwrap();
-            let slides = collection.record_with(finger, calibration, || ());
-            let slides = slides.unwrap();
-            for (slides, &texture) in slides.iter().zip(&collection.textures) {
-                let movements = &Collection::MOVEMENTS;
-                let observed = collection.observe(&plan, movements, texture, slides, &[]);
-                for (movement, trials) in (0..).zip(observed.unwrap()) {
-                    let vectors = trials.iter().map(|trial| {
-                        let vector = trial.whole.vector(set, features.into()).unwrap();
-                        table.whiten(movement, &vector).unwrap()
-                    });
-                    let vectors: Vec<_> = vectors.collect();
-                    let known = table.white_mean(u16::from(texture) - 1, movement);
-                    for (axis, known) in known.enumerate() {
-                        let sum: f64 = vectors.iter().map(|v| f64::from(v[axis])).sum();
-                        let mean = sum / vectors.len() as f64;
-                        // two roundings
-                        assert!(
-                            (mean - f64::from(known)).abs() <= 2.0,
-                            "{finger}, texture {texture}, movement {movement}, axis {axis}: {mean} and {known}; if \
-                             simulator or features were changed on purpose: cargo xtask campaign factory -- --write"
-                        );
-                    }
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -19,17 +19,15 @@ use tactus_core::probe::RigState;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault as Named, Phase};
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::biotac;
 use tactus_core::store::StoreError;
 use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 
 use self::naming::Naming;
 use super::collection::Collection;
 use super::flash::{RamFlash, SECTOR, TABLE};
-use super::press::FORCE_LIMIT_N;
 use super::probe::{Host, SimProbe, switch_on};
-use super::rig::{SimError, SimRig};
+use super::rig::{FORCE_LIMIT_N, SimError, SimRig};
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;
 
@@ -215,7 +213,6 @@ impl fmt::Display for Outcome {
 #[derive(Default)]
 struct HostLog {
     named: Vec<Named>,
-    /// Time of the first one.
     first_ns: Option<u64>,
     learned: bool,
     troubles: Vec<Failure>,
@@ -264,9 +261,6 @@ pub struct Bench<'t> {
 
 impl<'t> Bench<'t> {
     /// A calibrated rig.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn new(factory: &'t [u8]) -> Result<Self, SimError> {
         let mut rig = SimRig::new(world().setup(1, 1));
         rig.home()?;
@@ -279,9 +273,6 @@ impl<'t> Bench<'t> {
     }
 
     /// Runs a case.
-    ///
-    /// # Errors
-    /// See [`CaseError`].
     pub fn run(&self, case: &Case) -> Result<Outcome, CaseError> {
         let setup = world().setup(case.texture, case.seed);
         let mut rig = SimRig::unguarded(setup, self.unguarded);
@@ -369,7 +360,6 @@ impl<'t> Bench<'t> {
     }
 }
 
-/// The data that a probe keeps without power.
 #[derive(PartialEq)]
 struct Kept {
     table: Vec<u8>,
@@ -418,7 +408,9 @@ fn now_ns(probe: &mut SimProbe<'_, HostLog>) -> u64 {
 
 /// Sends the probe a command; returns the reason why it was not done, in its words.
 fn send(probe: &mut SimProbe<'_, HostLog>, command: Command) -> Result<(), String> {
-    block_on(probe.perform(&command)).map_err(|why| why.to_string())
+    block_on(probe.perform(&command))
+        .map(drop)
+        .map_err(|why| why.to_string())
 }
 
 fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {
@@ -477,7 +469,7 @@ fn repaired(
 ) {
     probe.rig.servo.rig().world().clear();
     // a sensor that is plugged in again starts up
-    for _ in 0..=BioTac::POWER_UP_MS {
+    for _ in 0..=biotac::PARTS.power_up_ms {
         probe.rig.servo.tick();
     }
     let mut homed = Ok(());

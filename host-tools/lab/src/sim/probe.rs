@@ -59,7 +59,7 @@ pub trait Host {
 
 /// A simulated rig that a servo drives: ours, or one that an arm moves.
 pub trait Driven {
-    /// See [`Servo::HAS_STAGE`].
+    /// See [`Servo::has_stage`].
     const HAS_STAGE: bool;
 
     /// A millisecond passes.
@@ -74,10 +74,7 @@ pub trait Driven {
     /// Virtual time since power-up.
     fn now(&self) -> Duration;
 
-    /// Gives it a command.
-    ///
-    /// # Errors
-    /// It refuses that.
+    /// Gives it a command, which it may refuse.
     fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
 
     /// Stops the command.
@@ -205,7 +202,9 @@ impl<'p, H: Host, R: Driven> SimServo<'p, H, R> {
 }
 
 impl<H: Host, R: Driven> Servo for SimServo<'_, H, R> {
-    const HAS_STAGE: bool = R::HAS_STAGE;
+    fn has_stage(&self) -> bool {
+        R::HAS_STAGE
+    }
 
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
         self.ended = None;
@@ -303,9 +302,7 @@ pub type SimProbe<'p, H, R = SimRig> =
 
 /// Switches a probe on: `rig` has found its switches, `flash` is as an earlier life left it, `factory` is the table
 /// that comes with the firmware. `buffer` takes the longest table.
-///
-/// # Errors
-/// The flash is too small for a store. Other faults in it are reported to the host, as by the firmware.
+/// Errors: the flash is too small for a store. Other faults in it are reported to the host, as by the firmware.
 pub fn switch_on<'p, H: Host, R: Driven>(
     rig: R,
     flash: RamFlash,
@@ -335,9 +332,6 @@ pub fn switch_on<'p, H: Host, R: Driven>(
 }
 
 /// Takes the power from a probe for a moment: it keeps the contents of its flash only. Its rig stays as it is.
-///
-/// # Errors
-/// See [`switch_on`].
 pub fn switch_off_and_on<H: Host, R: Driven>(
     probe: SimProbe<'_, H, R>,
 ) -> Result<SimProbe<'_, H, R>, StoreError> {
@@ -345,10 +339,7 @@ pub fn switch_off_and_on<H: Host, R: Driven>(
 }
 
 /// The same, and these bits of its flash change meanwhile.
-///
-/// # Errors
-/// See [`switch_on`].
-pub fn switch_off_changed_and_on<'p, H: Host, R: Driven>(
+pub(crate) fn switch_off_changed_and_on<'p, H: Host, R: Driven>(
     probe: SimProbe<'p, H, R>,
     bits: &[usize],
 ) -> Result<SimProbe<'p, H, R>, StoreError> {

@@ -20,39 +20,6 @@ use crate::sim::rig::SimRig;
 use tactus_world::played::{Played, SHEAR_HZ};
 use tactus_world::world::Setup;
 
-/// Reasons why recordings cannot be played.
-#[derive(Debug, thiserror::Error)]
-pub enum PlayError {
-    /// They cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// The stage would have nothing to overcome.
-    #[error(
-        "slide {number} of {texture} has no shear at {SHEAR_HZ} Hz; play recordings with a force sensor of that rate"
-    )]
-    Shear {
-        /// Name of the texture.
-        texture: String,
-        /// Number of the slide.
-        number: u32,
-    },
-    /// Slides of other movements look the same while they are played.
-    #[error("the recordings are of {}; play those of one movement", count(*.0 as u64, "movement"))]
-    Movements(usize),
-    /// No slide is left to learn from or to test with.
-    #[error(
-        "{texture} has {}; learning from {train} takes 2 or more, and one must be left", count(*there as u64, "slide")
-    )]
-    Slides {
-        /// Name of the texture.
-        texture: String,
-        /// Slides it has.
-        there: usize,
-        /// Slides to learn from.
-        train: usize,
-    },
-}
-
 /// Recorded slides of one movement, divided into those that are learned and those that the unknown texture shows.
 #[derive(Clone, Debug)]
 pub struct RecordedTexture {
@@ -69,13 +36,17 @@ pub struct RecordedTexture {
 impl RecordedTexture {
     /// All textures of a folder; `train` slides of each, drawn by `seed` from its whole session, are to be learned from
     /// (interleaved).
-    ///
-    /// # Errors
-    /// See [`PlayError`].
-    pub fn interleaved(set: &RecordingSet, train: usize, seed: u64) -> Result<Self, PlayError> {
+    pub fn interleaved(
+        set: &RecordingSet,
+        train: usize,
+        seed: u64,
+    ) -> Result<Self, RecordingError> {
         let movements = set.movements();
         let &[movement] = movements.as_slice() else {
-            return Err(PlayError::Movements(movements.len()));
+            let there = count(movements.len() as u64, "movement");
+            return Err(RecordingError::said(format!(
+                "the recordings are of {there}; play those of one movement"
+            )));
         };
         let names: Vec<String> = set.textures().iter().map(|t| t.name.clone()).collect();
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -83,18 +54,20 @@ impl RecordedTexture {
         for (index, name) in names.iter().enumerate() {
             let slides = set.load_texture(index)?;
             if train < 2 || train >= slides.len() {
-                return Err(PlayError::Slides {
-                    texture: name.clone(),
-                    there: slides.len(),
-                    train,
-                });
+                let there = count(slides.len() as u64, "slide");
+                return Err(RecordingError::said(format!(
+                    "{name} has {there}; learning from {train} takes 2 or more, and one must be left"
+                )));
             }
             let mut slides = slides
                 .iter()
                 .map(|slide| {
-                    played(slide).ok_or_else(|| PlayError::Shear {
-                        texture: name.clone(),
-                        number: slide.number,
+                    played(slide).ok_or_else(|| {
+                        let number = slide.number;
+                        RecordingError::said(format!(
+                            "slide {number} of {name} has no shear at {SHEAR_HZ} Hz; play recordings with a force sensor of \
+                             that rate"
+                        ))
                     })
                 })
                 .collect::<Result<Vec<_>, _>>()?;
@@ -129,9 +102,7 @@ impl RecordedTexture {
     }
 
     /// Learns a table for a method on the rig, which measures every slide to learn from once.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
+    /// Errors: the first fault of a rig, or slide without properties.
     pub fn learn(
         &self,
         method: Method,

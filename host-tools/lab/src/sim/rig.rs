@@ -23,10 +23,10 @@ use tactus_world::conditions::Conditions;
 use tactus_world::slot::Reader;
 use tactus_world::world::{Setup, World};
 
+/// Largest force that the finger ever bears, N.
+pub const FORCE_LIMIT_N: f64 = 2.2;
 const TICK_NS: u64 = 1_000_000;
-/// STEP stays high this long.
 const PULSE_NS: u64 = 5_000;
-/// DIR is set this long before STEP rises.
 const DIR_NS: u64 = 2_000;
 
 /// Motor current amplifier of the reference board: 1 V/A about half of 3.3 V, 12 bits.
@@ -76,9 +76,7 @@ pub struct SimRig {
     down: bool,
     next_step_ns: u64,
     outputs: Outputs,
-    /// Motor current of the last tick, A.
     current_a: f32,
-    /// P_DC words of the last tick.
     pdc: Vec<u16>,
     performed: Vec<Performed>,
 }
@@ -117,15 +115,7 @@ impl SimRig {
     fn of(world: World, setup: Setup, unguarded: Unguarded) -> Self {
         let reader = Reader::new(setup.finger);
         let model = reader.model();
-        let calibration = RigCalibration {
-            pressure: model.calibration,
-            unloaded_a: (0.037, 0.0),
-            newton_per_ampere: 16.4,
-            date: 0,
-            air_known: false,
-            turned: 0,
-            serial: [0; 16],
-        };
+        let calibration = RigCalibration::unmeasured(model);
         Self {
             world,
             started: reader.start().is_empty(),
@@ -161,7 +151,7 @@ impl SimRig {
         &mut self.world
     }
 
-    /// Gravity along the finger by its decoder, counts of P_AC: see [`tactus_core::sensor::PressureSensor::gravity`].
+    /// Gravity along the finger by its decoder, counts of P_AC: see [`tactus_core::sensor::AnyFinger::gravity`].
     pub fn gravity(&self) -> Option<f32> {
         self.reader.gravity()
     }
@@ -192,9 +182,7 @@ impl SimRig {
     }
 
     /// Puts another texture under the lifted finger.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`] while the finger is down.
+    /// Errors: [`Refused::Busy`] while the finger is down.
     pub fn place(&mut self, texture: u8) -> Result<(), SimError> {
         self.world.place(texture).map_err(|_| Refused::Busy)?;
         self.control.sample_changed();
@@ -256,7 +244,6 @@ impl SimRig {
         seconds * 1_000_000_000 + slot * 1_000_000_000 / hz
     }
 
-    /// A slot.
     fn sample(&mut self, at_ns: u64) {
         let slot = self.slot;
         self.slot += 1;
@@ -298,9 +285,7 @@ impl SimRig {
     }
 
     /// Runs the rig until it is at rest: ready, parked or faulted with the finger off the sample.
-    ///
-    /// # Errors
-    /// The fault that it came to, or that it never came to rest.
+    /// Errors: the fault that it came to, or that it never came to rest.
     pub fn rest(&mut self, mut each: impl FnMut(&Outputs)) -> Result<(), SimError> {
         let mut timeout = MovementTimeout::default();
         let mut hung = Phase::Parked;
@@ -323,9 +308,6 @@ impl SimRig {
     }
 
     /// Powers up: waits for the sensor, finds the limit switches.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn home(&mut self) -> Result<(), SimError> {
         for _ in 0..=self.reader.power_up_ms() {
             self.tick();
@@ -336,10 +318,8 @@ impl SimRig {
     }
 
     /// Does the finger's start-up list, if it has not been done.
-    ///
-    /// # Errors
-    /// A part does not answer as it must; it may be tried again.
-    pub fn start_finger(&mut self) -> Result<(), SimError> {
+    /// Errors: A part does not answer as it must; it may be tried again.
+    pub(crate) fn start_finger(&mut self) -> Result<(), SimError> {
         if self.started {
             return Ok(());
         }
@@ -360,9 +340,7 @@ impl SimRig {
 
     /// Makes one movement, beginning at `start` (0 to 1 of the length that the sample leaves); `each` gets the outputs
     /// of every tick.
-    ///
-    /// # Errors
-    /// See [`SimError`]. The stage stands then, and the finger is lifted.
+    /// Errors: see [`SimError`]. The stage stands then, and the finger is lifted.
     pub fn slide(
         &mut self,
         movement: Movement,
@@ -432,9 +410,6 @@ impl SimRig {
 
     /// Makes one movement and records it; repeats a slide with a gap, and one that failed with an error that the rig
     /// recovers from by itself. Texture and number are left at 0.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn record(&mut self, movement: Movement) -> Result<Recording, SimError> {
         let mut failed = SimError::from(Fault::Rejected);
         for _ in 0..MAX_REJECTED {
@@ -528,8 +503,6 @@ impl Rig for SimRig {
     }
 }
 
-#[cfg(test)]
-mod fingers;
 mod measuring;
 #[cfg(test)]
-mod weights;
+mod tests;

@@ -1,10 +1,10 @@
 //! Scenarios for the handheld probe as files: a person's actions, and the expected screens.
 //!
 //! A scenario is JSON: the texture under the finger, the steadiness of the hand, and steps, each of which does one
-//! thing ([`Step`]). The file is not trusted: a scenario that is accepted ([`Scenario::parse`]) can be played, in a
-//! time that has an end ([`Scenario::longest_s`]). The emulated board plays them.
+//! thing ([`Step`]). The emulated board plays them.
 
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
@@ -14,21 +14,6 @@ use tactus_world::world::Setup;
 
 /// Longest wait of a step, s, unless it gives another.
 pub const TIMEOUT_S: f64 = 8.0;
-/// Limits of a scenario: bytes of a file, steps, and virtual seconds that they may take.
-const MAX_BYTES: u64 = 256 << 10;
-const MAX_STEPS: usize = 1000;
-const MAX_S: f64 = 3600.0;
-/// A finger is not pressed harder, N, or moved faster, mm/s.
-const MAX_FORCE_N: f64 = 10.0;
-const MAX_PACE_MM_S: f64 = 500.0;
-/// Largest relative deviation of a hand.
-const MAX_DEVIATION: f64 = 1.0;
-const MAX_TILT_MM: f64 = 10.0;
-/// Seeds have room for trials behind them.
-const MAX_SEED: u64 = 1_000_000;
-/// Tones that a person can hear, Hz.
-const MAX_HZ: u32 = 20_000;
-
 /// A scenario.
 #[derive(Clone, PartialEq, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -159,156 +144,22 @@ fn once() -> u32 {
     1
 }
 
-/// Reasons why a file is no scenario.
+/// A name that is none of Table 1.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScenarioError {
-    /// It cannot be read.
-    #[error("{} cannot be read", path.display())]
-    Read {
-        /// Its path.
-        path: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
-    /// It is invalid.
-    #[error("{}: {why}", path.display())]
-    Invalid {
-        /// Its path.
-        path: PathBuf,
-        /// The reason.
-        why: InvalidScenario,
-    },
-}
-
-/// Faults in a scenario.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum InvalidScenario {
-    /// It is longer than any.
-    #[error("more than {MAX_BYTES} bytes")]
-    TooLong,
-    /// It is no JSON, or has unknown fields.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
-    /// No such texture.
-    #[error("no texture {0:?} in Table 1")]
-    Texture(String),
-    /// A seed without room for trials behind it.
-    #[error("{what} is {is}: 0 to {MAX_SEED}")]
-    Seed {
-        /// Which.
-        what: &'static str,
-        /// Its value.
-        is: u64,
-    },
-    /// More than there is time for.
-    #[error("{0} steps: at most {MAX_STEPS}")]
-    Steps(usize),
-    /// A number beyond its range.
-    #[error("{whose}: {what} is {is}: {low} to {high}")]
-    Number {
-        /// The hand, or the number of the step.
-        whose: String,
-        /// Which.
-        what: &'static str,
-        /// Its value.
-        is: f64,
-        /// Least.
-        low: f64,
-        /// Most.
-        high: f64,
-    },
-    /// A step that looks for nothing.
-    #[error("step {0} looks for no text")]
-    Nothing(usize),
-    /// It takes too long.
-    #[error("it may take {0:.0} s: at most {MAX_S} s")]
-    Endless(f64),
-}
+#[error("no texture {0:?} in Table 1")]
+pub struct UnknownTexture(String);
 
 impl Scenario {
     /// Reads a scenario.
-    ///
-    /// # Errors
-    /// See [`ScenarioError`].
-    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
-        use std::io::Read as _;
-        let read = |source| ScenarioError::Read {
-            path: path.into(),
-            source,
-        };
-        let file = std::fs::File::open(path).map_err(read)?;
-        let mut bytes = Vec::new();
-        file.take(MAX_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(read)?;
-        Self::parse(&bytes).map_err(|why| ScenarioError::Invalid {
-            path: path.into(),
-            why,
-        })
+    /// Errors: the file cannot be read, or is no scenario.
+    pub fn read(path: &Path) -> io::Result<Self> {
+        Ok(Self::parse(&std::fs::read(path)?)?)
     }
 
     /// A scenario from its JSON.
-    ///
-    /// # Errors
-    /// See [`InvalidScenario`].
-    pub fn parse(json: &[u8]) -> Result<Self, InvalidScenario> {
-        if json.len() as u64 > MAX_BYTES {
-            return Err(InvalidScenario::TooLong);
-        }
-        let scenario: Self = serde_json::from_slice(json)?;
-        scenario.check()?;
-        Ok(scenario)
-    }
-
-    fn check(&self) -> Result<(), InvalidScenario> {
-        texture(&self.texture)?;
-        for (what, is) in [("world", self.world), ("seed", self.seed)] {
-            if is > MAX_SEED {
-                return Err(InvalidScenario::Seed { what, is });
-            }
-        }
-        if self.step.len() > MAX_STEPS {
-            return Err(InvalidScenario::Steps(self.step.len()));
-        }
-        let Manner {
-            tremor,
-            wander,
-            uneven,
-            force_spread,
-            pace_spread,
-            tilt_mm,
-        } = self.hand;
-        for (what, is) in [
-            ("tremor", tremor),
-            ("wander", wander),
-            ("uneven", uneven),
-            ("force_spread", force_spread),
-            ("pace_spread", pace_spread),
-        ] {
-            within("the hand", what, is, 0.0, MAX_DEVIATION)?;
-        }
-        within(
-            "the hand",
-            "tilt_mm",
-            tilt_mm.unwrap_or(0.0),
-            0.0,
-            MAX_TILT_MM,
-        )?;
-        for (step, number) in self.step.iter().zip(1..) {
-            step.check(number)?;
-        }
-        let longest_s = self.longest_s();
-        if longest_s > MAX_S {
-            return Err(InvalidScenario::Endless(longest_s));
-        }
-        Ok(())
-    }
-
-    /// Virtual seconds that it takes at most.
-    pub fn longest_s(&self) -> f64 {
-        self.step.iter().map(Step::longest_s).sum()
+    /// Errors: it is none.
+    pub fn parse(json: &[u8]) -> serde_json::Result<Self> {
+        serde_json::from_slice(json)
     }
 
     /// The rig for the board that is switched on for the `starts`th time, from 0: every time is another trial, of which
@@ -324,108 +175,12 @@ impl Scenario {
 }
 
 /// Number of a texture of Table 1.
-///
-/// # Errors
-/// There is no such texture.
-pub fn texture(name: &str) -> Result<u8, InvalidScenario> {
-    texture_number(name).ok_or_else(|| InvalidScenario::Texture(name.into()))
-}
-
-fn within(
-    whose: &str,
-    what: &'static str,
-    is: f64,
-    low: f64,
-    high: f64,
-) -> Result<(), InvalidScenario> {
-    // a NaN is in no range
-    if (low..=high).contains(&is) {
-        return Ok(());
-    }
-    Err(InvalidScenario::Number {
-        whose: whose.into(),
-        what,
-        is,
-        low,
-        high,
-    })
+/// Errors: there is no such texture.
+pub fn texture(name: &str) -> Result<u8, UnknownTexture> {
+    texture_number(name).ok_or_else(|| UnknownTexture(name.into()))
 }
 
 impl Step {
-    fn check(&self, number: usize) -> Result<(), InvalidScenario> {
-        let whose = format!("step {number}");
-        let time = |is| within(&whose, "its time in s", is, 0.0, MAX_S);
-        let force = |is| within(&whose, "force_n", is, 0.0, MAX_FORCE_N);
-        let pace = |is| within(&whose, "pace_mm_s", is, -MAX_PACE_MM_S, MAX_PACE_MM_S);
-        match self {
-            Self::See { text, within_s } => {
-                if text.iter().all(String::is_empty) {
-                    return Err(InvalidScenario::Nothing(number));
-                }
-                time(*within_s)
-            }
-            Self::Miss { text } => {
-                // nothing is on every display
-                if text.is_empty() || text.iter().any(String::is_empty) {
-                    return Err(InvalidScenario::Nothing(number));
-                }
-                Ok(())
-            }
-            Self::Dark { within_s } => time(*within_s),
-            Self::Hear { hz } => within(&whose, "hz", f64::from(*hz), 1.0, f64::from(MAX_HZ)),
-            Self::Hand { force_n, pace_mm_s } => {
-                force(*force_n)?;
-                pace(*pace_mm_s)
-            }
-            Self::Slide {
-                force_n,
-                pace_mm_s,
-                seconds,
-            }
-            | Self::Explore {
-                force_n,
-                pace_mm_s,
-                seconds,
-                ..
-            } => {
-                force(*force_n)?;
-                pace(*pace_mm_s)?;
-                time(*seconds)
-            }
-            Self::Wait { seconds } => time(*seconds),
-            Self::Place { texture: name } => texture(name).map(|_| ()),
-            // their time is counted
-            Self::Press { .. }
-            | Self::Note { .. }
-            | Self::PowerCycle
-            | Self::Sensor { .. }
-            | Self::Display { .. } => Ok(()),
-        }
-    }
-
-    /// Virtual seconds that it takes at most.
-    fn longest_s(&self) -> f64 {
-        match self {
-            Self::See { within_s, .. } | Self::Dark { within_s } => *within_s,
-            Self::Slide { seconds, .. } => slide_s(*seconds),
-            Self::Explore {
-                slides, seconds, ..
-            } => f64::from(*slides) * (slide_s(*seconds) + Self::VERDICT_S),
-            Self::Press { ms, times } => {
-                f64::from(*times) * (*ms as f64 + Self::RELEASED_MS as f64) * 1e-3
-            }
-            Self::Wait { seconds } => *seconds,
-            Self::Note { .. }
-            | Self::Miss { .. }
-            | Self::Hear { .. }
-            | Self::Hand { .. }
-            | Self::Place { .. }
-            | Self::PowerCycle
-            | Self::Sensor { .. }
-            | Self::Display { .. } => 0.0,
-        }
-    }
-
     /// Time from a view to the reaction, ms.
     pub const REACTION_MS: u64 = 300;
     /// Default duration of a slide of [`Step::Explore`], and longest wait for its verdict, s.
@@ -439,11 +194,3 @@ impl Step {
     /// From one press of the button to the next, ms.
     pub const RELEASED_MS: u64 = 100;
 }
-
-/// Duration of a slide of so many seconds, with all waits.
-fn slide_s(seconds: f64) -> f64 {
-    TIMEOUT_S + Step::REACTION_MS as f64 * 1e-3 + seconds + Step::HELD_S + Step::LIFTED_S
-}
-
-#[cfg(test)]
-mod tests;

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::result::{Series, StepResult};
+use super::judge::Finding;
 use super::steps::Step;
 
 /// A step that is over.
@@ -23,9 +23,9 @@ pub struct Entry {
     pub saw: String,
     /// What is wrong.
     pub mistakes: Vec<EntryMistake>,
-    /// What can be drawn.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub series: Option<EntrySeries>,
+    /// Counts of P_DC and weights, mN, of the force scale.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f64; 2]>,
 }
 
 /// Something that is wrong.
@@ -39,21 +39,10 @@ pub struct EntryMistake {
     pub remedy: String,
 }
 
-/// Points.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct EntrySeries {
-    /// What they show.
-    pub title: String,
-    /// Names of the axes.
-    pub axes: [String; 2],
-    /// The points.
-    pub points: Vec<[f64; 2]>,
-}
-
 impl Entry {
     /// What a step found at a time.
-    pub fn new(step: &Step, at: String, found: &StepResult) -> Self {
-        let mistakes = found.finding.named.iter().map(|named| {
+    pub fn new(step: &Step, at: String, found: &Finding) -> Self {
+        let mistakes = found.named.iter().map(|named| {
             let place = match named.place {
                 "" => String::new(),
                 place => format!(" ({place})"),
@@ -64,18 +53,13 @@ impl Entry {
                 remedy: named.mistake.remedy.to_owned(),
             }
         });
-        let series = found.series.as_ref().map(|series: &Series| EntrySeries {
-            title: series.title.to_owned(),
-            axes: series.axes.map(str::to_owned),
-            points: series.points.clone(),
-        });
         Self {
             step: step.key.to_owned(),
             at,
-            passed: found.finding.passed(),
-            saw: found.finding.saw.clone(),
+            passed: found.passed(),
+            saw: found.saw.clone(),
             mistakes: mistakes.collect(),
-            series,
+            points: found.points.clone(),
         }
     }
 }
@@ -89,9 +73,6 @@ pub struct Journal {
 
 impl Journal {
     /// Opens the journal at a path, or begins it. A last line that a power cut left unfinished is nothing.
-    ///
-    /// # Errors
-    /// It cannot be read or written, or another line of it is no entry.
     pub fn open(path: &Path) -> io::Result<Self> {
         let mut file = OpenOptions::new()
             .read(true)
@@ -126,9 +107,6 @@ impl Journal {
     }
 
     /// Writes an entry, and has the disk keep it.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub fn add(&mut self, entry: Entry) -> io::Result<()> {
         let mut line = serde_json::to_string(&entry)?;
         line.push('\n');
@@ -150,7 +128,7 @@ mod tests {
             passed,
             saw: "3.30 V".to_owned(),
             mistakes: Vec::new(),
-            series: None,
+            points: Vec::new(),
         }
     }
 

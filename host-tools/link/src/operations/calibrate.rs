@@ -4,8 +4,8 @@ use std::io::Write as _;
 
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::weigh::ForceScale;
-use tactus_core::sensor::mems::Mems;
-use tactus_core::sensor::{FingerCode, FingerName, PressureSensor as _};
+use tactus_core::sensor::mems;
+use tactus_core::sensor::{FingerCode, FingerName};
 use tactus_core::wire::Command;
 
 use super::Result;
@@ -88,7 +88,7 @@ pub async fn turn_over(probe: &Probe, day: u32) -> Result<RigCalibration> {
         )));
     }
     let turned = probe.perform(Request::turn_over()).await?;
-    let nominal = Mems::MODEL.calibration.pac_pa_per_count;
+    let nominal = mems::PARTS.model.calibration.pac_pa_per_count;
     let mg = 1e3 / turned.g_counts;
     writeln!(
         probe.words(),

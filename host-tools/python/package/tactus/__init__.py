@@ -12,7 +12,6 @@ from ._tactus import (
     Features,
     Probe,
     ProbeError,
-    Properties,
     RecordingError,
     Recordings,
     SimulatedRig,
@@ -25,7 +24,6 @@ from ._tactus import (
     __version__,
     features,
     features_of,
-    learn_by_hand,
     read_log,
     simulate,
 )
@@ -37,7 +35,6 @@ __all__ = [
     "Features",
     "Probe",
     "ProbeError",
-    "Properties",
     "RecordingError",
     "Recordings",
     "Rig",
@@ -52,11 +49,8 @@ __all__ = [
     "TactusError",
     "__version__",
     "evaluate",
-    "evaluate_verify",
     "features",
     "features_of",
-    "learn_by_hand",
-    "novelty",
     "read_log",
     "simulate",
     "verify",
@@ -65,7 +59,7 @@ __all__ = [
 _DEFAULTS = {
     "method": "fused",
     "protocol": "interleaved",
-    "train_slides": None,
+    "train_slides": 5,
     "runs": 8000,
     "seed": 1,
     "threshold": 0.99,
@@ -73,8 +67,6 @@ _DEFAULTS = {
     "features": None,
     "drift": (0.1, 0.04),
     "false_alarm": None,
-    "test": None,
-    "reliability": True,
 }
 
 
@@ -88,45 +80,21 @@ def _arguments(given):
 def evaluate(recordings, **arguments):
     """Play virtual explorations and count the right answers, as `tactus evaluate` does.
 
-    recordings: `Recordings` or `Properties`; every texture is the unknown one in turn.
+    recordings: `Recordings`; every texture is the unknown one in turn.
     method: "fused", "fused-cycle", "fused-random", "student-all", "student", "paper", "cycle" or "random".
     protocol: "interleaved", "blocked" or "drift": which slides are learned from, and which are tested.
-    train_slides: slides to learn from, per texture and movement (5, or all of `Properties`).
+    train_slides: slides to learn from, per texture and movement (5).
     runs: virtual explorations (8000). seed: of all draws (1).
     threshold: an exploration ends when a texture is more probable than this (0.99). max_slides: or after so many (10).
     features: "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
     drift: standard deviations of band powers (ln) and of traction (share) from session to session (0.1, 0.04).
     false_alarm: share of known textures that may be taken for new ones; the table's own, unless given.
-    test: other `Recordings` to take the test slides from.
-    reliability: whether `reliability` is computed, a third of the work (True).
 
     Returns a dict with what `tactus evaluate --format json` prints, to the digit: shares 0 to 1, slides, `verdicts`,
     `reliability`, `confused`.
     Raises TactusError where the slides do not suffice, ValueError for an argument, KeyboardInterrupt after Ctrl-C.
     """
     return _tactus.evaluate(recordings, _arguments(arguments))
-
-
-def novelty(recordings, left_out=1, **arguments):
-    """Leave textures out of the table in turn, and count how they are noticed, as `tactus evaluate --novelty leave-one-out`.
-
-    left_out: textures that are left out together. Other arguments, results and errors as of `evaluate`; method "fused" only.
-
-    Returns a dict: `novelty`, a list by slides (1, 2, 3) of shares told of `known` and of `unknown` textures; `verdicts_new` and
-    `verdicts_known`, what users are told in the end.
-    """
-    return _tactus.leave_out(recordings, left_out, _arguments(arguments))
-
-
-def evaluate_verify(recordings, **arguments):
-    """Count how often slides are rightly called the same as a reference, and how often wrongly, as `tactus evaluate --verify`.
-
-    Arguments, results and errors as of `evaluate`; method "fused" only.
-
-    Returns a dict: `verify`, a list by slides (1, 2, 3) with `equal_error`, `false_reject`, `false_accept` (shares) and `curve`
-    (pairs of both, limit by limit); `same` and `other`, what is told of the reference's own slides and of others'.
-    """
-    return _tactus.verifications(recordings, _arguments(arguments))
 
 
 def verify(table, texture, slides, **arguments):

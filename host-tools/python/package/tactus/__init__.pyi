@@ -114,19 +114,10 @@ class Recordings:
     def settings(self) -> List[Tuple[float, float]]: ...
     @property
     def finger(self) -> Tuple[str, int]: ...
-    def manifest(self) -> List[Dict[str, Any]]: ...
     def slides(self, texture: Union[int, str]) -> List[Slide]: ...
     def measured_slides(self, texture: Union[int, str]) -> List[Features]: ...
     def features(self) -> Dict[str, NDArray[Any]]: ...
     def __len__(self) -> int: ...
-
-class Properties:
-    """A table of measured properties (columns texture, movement, trial, set, traction, roughness, fineness), as for
-    `tactus evaluate --properties`. Raises RecordingError where it makes no sense."""
-
-    def __init__(self, file: Union[str, PathLike[str]]) -> None: ...
-    @property
-    def textures(self) -> List[str]: ...
 
 class Table:
     """A texture table."""
@@ -170,41 +161,14 @@ class Table:
     def __len__(self) -> int: ...
 
 def evaluate(
-    recordings: Union[Recordings, Properties],
+    recordings: Recordings,
     *,
     method: str = "fused",
     protocol: str = "interleaved",
-    train_slides: Optional[int] = None,
+    train_slides: int = 5,
     runs: int = 8000,
     seed: int = 1,
     threshold: float = 0.99,
-    max_slides: int = 10,
-    features: Optional[str] = None,
-    drift: Tuple[float, float] = (0.1, 0.04),
-    false_alarm: Optional[float] = None,
-    test: Optional[Recordings] = None,
-    reliability: bool = True,
-) -> Dict[str, Any]: ...
-def novelty(
-    recordings: Union[Recordings, Properties],
-    left_out: int = 1,
-    *,
-    protocol: str = "interleaved",
-    train_slides: Optional[int] = None,
-    runs: int = 8000,
-    seed: int = 1,
-    max_slides: int = 10,
-    features: Optional[str] = None,
-    drift: Tuple[float, float] = (0.1, 0.04),
-    false_alarm: Optional[float] = None,
-) -> Dict[str, Any]: ...
-def evaluate_verify(
-    recordings: Union[Recordings, Properties],
-    *,
-    protocol: str = "interleaved",
-    train_slides: Optional[int] = None,
-    runs: int = 8000,
-    seed: int = 1,
     max_slides: int = 10,
     features: Optional[str] = None,
     drift: Tuple[float, float] = (0.1, 0.04),
@@ -269,11 +233,7 @@ def simulate(
     trials: int = 5,
     seed: int = 1,
     finger: str = "biotac",
-    folder: Union[str, PathLike[str], None] = None,
 ) -> Dict[str, List[Slide]]: ...
-def learn_by_hand(
-    textures: Optional[Sequence[str]] = None, *, trials: int = 5, seed: int = 1, finger: str = "biotac"
-) -> Tuple[Table, List[str]]: ...
 
 class Events(Iterator[Dict[str, Any]]):
     """What a probe says while it is at something."""

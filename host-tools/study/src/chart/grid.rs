@@ -18,7 +18,6 @@ pub(crate) struct Tile {
     pub(crate) says: String,
 }
 
-/// A table of shaded cells.
 pub(crate) struct Grid<'a> {
     pub(crate) id: String,
     pub(crate) title: String,
@@ -30,7 +29,6 @@ pub(crate) struct Grid<'a> {
     pub(crate) y: (&'a str, Vec<String>),
     /// Row by row.
     pub(crate) tiles: Vec<Vec<Tile>>,
-    /// Words below it.
     pub(crate) below: &'a str,
 }
 

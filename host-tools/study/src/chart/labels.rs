@@ -37,19 +37,18 @@ const MARK: i32 = 5;
 /// Rings round a point on which its label may stand.
 const RINGS: i32 = 14;
 
-/// The middle of a label beside each point, so that labels cover neither each other nor a point nor one of `taken`, and
-/// stay in `inside`; `None` if there is no place. The first ones have the choice.
+/// The middle of a label beside each point, so that labels cover neither each other nor a point, and stay in
+/// `inside`; `None` if there is no place. The first ones have the choice.
 pub(crate) fn place(
     points: &[(i32, i32)],
     labels: &[String],
     em: f64,
     inside: Area,
-    taken: &[Area],
 ) -> Vec<Option<(i32, i32)>> {
     let marks = points
         .iter()
         .map(|&(x, y)| [x - MARK, y - MARK, x + MARK, y + MARK]);
-    let mut taken: Vec<Area> = marks.chain(taken.iter().copied()).collect();
+    let mut taken: Vec<Area> = marks.collect();
     let mut placed = Vec::new();
     for (&(x, y), label) in points.iter().zip(labels) {
         let (half, tall) = (width(label, em) / 2, (em / 2.0).ceil() as i32);
@@ -105,7 +104,7 @@ mod tests {
             let mut at = |range: std::ops::Range<i32>| random.random_range(range);
             let points: Vec<_> = (0..40).map(|_| (at(60..470), at(20..420))).collect();
             let labels: Vec<String> = (0..40).map(|n| "m".repeat(3 + n % 12)).collect();
-            let placed = place(&points, &labels, 13.0, inside, &[]);
+            let placed = place(&points, &labels, 13.0, inside);
             let areas: Vec<Area> = placed
                 .iter()
                 .zip(&labels)

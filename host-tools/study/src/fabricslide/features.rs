@@ -5,10 +5,8 @@ use std::sync::Arc;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
-use tactus_lab::data::content::ContentError;
-
 /// Taxels of the finger: values in a row.
-pub const TAXELS: usize = 16;
+pub(super) const TAXELS: usize = 16;
 /// Bins of the eight bands, half-open, in the spectrum of 256 samples.
 pub const BAND_EDGES: [usize; 9] = [2, 3, 5, 8, 13, 21, 34, 55, 90];
 /// Bytes in a row.
@@ -30,12 +28,8 @@ const FLAT: f64 = 1e-9;
 /// Smallest decorrelation: taxels that move as one have a logarithm. Those of data/fabricslide are at 0.27 or more.
 const RIGID: f64 = 1e-6;
 
-/// Bands and properties of a slide, as [`super::FabricSlide`] describes them.
-#[derive(Clone, Copy, Default, Debug)]
-pub(super) struct SlideSpectrum {
-    pub(super) ln_bands: [f32; 8],
-    pub(super) properties: [f32; 3],
-}
+/// ln of the bands' powers, and the properties, as [`super::FabricSlide`] has them.
+pub(super) type Measured = ([f32; 8], [f32; 3]);
 
 /// Window and transform, made once.
 pub(super) struct Meter {
@@ -58,17 +52,17 @@ impl Meter {
     ///
     /// # Errors
     /// The slide is too short, or no taxel moves.
-    pub(super) fn measure(&self, rows: &[u8]) -> Result<SlideSpectrum, ContentError> {
+    pub(super) fn measure(&self, rows: &[u8]) -> Result<Measured, &'static str> {
         let samples = rows.len() / ROW_BYTES;
         if samples < SHORTEST {
-            return Err(ContentError::Short(samples, SHORTEST));
+            return Err("a slide of fewer than 32 samples is too short");
         }
         let taxels: [Vec<f64>; TAXELS] = std::array::from_fn(|t| detrended(rows, t));
         let variances = taxels
             .each_ref()
             .map(|taxel| taxel.iter().map(|x| x * x).sum::<f64>() / samples as f64);
         if variances.iter().all(|v| *v < FLAT) {
-            return Err(ContentError::Silent);
+            return Err("no taxel moves: the finger did not touch, or the sensor is dead");
         }
         let spectrum = self.spectrum(&taxels);
         let ln_bands = std::array::from_fn(|b| {
@@ -81,10 +75,7 @@ impl Meter {
             centroid(&spectrum),
             decorrelation(&taxels, &variances),
         ];
-        Ok(SlideSpectrum {
-            ln_bands,
-            properties: properties.map(|x| x.ln() as f32),
-        })
+        Ok((ln_bands, properties.map(|x| x.ln() as f32)))
     }
 
     /// Averaged spectrum: |X|^2 over the sum of the squares of the window, mean over taxels and whole frames. A slide

@@ -1,41 +1,33 @@
-//! Pictures of `tactus evaluate`: the verdicts on each texture, and the reliability of the probabilities.
+//! Picture of `tactus evaluate`: the verdicts on each texture.
 
-use tactus_core::explorer::Told;
+use tactus_core::explorer::VerdictKind;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
-use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Series};
+use crate::chart::{COLOURS, DrawError, Figure};
 use tactus_lab::eval::courses::Course;
-use tactus_lab::eval::reliability::{Statements, statements, verdicts};
-
-/// The two pictures of these explorations, among textures of these names, at this threshold.
-///
-/// # Errors
-/// See [`DrawError`].
-pub fn figures(
-    courses: &[Course],
-    names: &[String],
-    threshold: f32,
-) -> Result<Vec<Figure>, DrawError> {
-    Ok(vec![
-        confusion(courses, names, threshold)?,
-        reliability(courses, threshold)?,
-    ])
-}
+use tactus_lab::eval::reliability::verdicts;
 
 /// More names than this are written as numbers below the columns, and no share is written into a cell.
 const FEW: usize = 12;
 
-/// Verdicts, row by row: presented textures, and columns of verdicts.
-fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Figure, DrawError> {
+/// Verdicts of these explorations at this threshold, row by row: presented textures, and columns of verdicts.
+///
+/// # Errors
+/// See [`DrawError`].
+pub fn confusion(
+    courses: &[Course],
+    names: &[String],
+    threshold: f32,
+) -> Result<Figure, DrawError> {
     let known = names.len();
     let mut counts = vec![vec![0_u64; known + 3]; known];
     for course in courses {
         let (told, _, texture) = course.told(threshold);
         let column = match told {
-            Told::Sure => texture,
-            Told::Changed => known,
-            Told::New => known + 1,
-            Told::Undecided => known + 2,
+            VerdictKind::Sure => texture,
+            VerdictKind::Changed => known,
+            VerdictKind::New => known + 1,
+            VerdictKind::Undecided => known + 2,
         };
         counts[course.presented][column] += 1;
     }
@@ -112,72 +104,4 @@ fn confusion(courses: &[Course], names: &[String], threshold: f32) -> Result<Fig
 /// A share in %, without the digits of its binary form.
 fn percent(share: f32) -> f64 {
     (f64::from(share) * 1e6).round() / 1e4
-}
-
-/// Confidence interval of 95 % for the true share, if `right` of `count` were found (Wilson 1927).
-fn wilson(right: u64, count: u64) -> (f64, f64) {
-    const Z: f64 = 1.96;
-    let (n, p) = (count as f64, right as f64 / count as f64);
-    let middle = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
-    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt() / (1.0 + Z * Z / n);
-    ((middle - half).max(0.0), (middle + half).min(1.0))
-}
-
-fn reliability(courses: &[Course], threshold: f32) -> Result<Figure, DrawError> {
-    let bins = statements(courses, threshold);
-    let mut right = Series::points(
-        0,
-        MARKS[0],
-        "was right (bar: 95 % of such counts)",
-        Vec::new(),
-    );
-    let mut said = Series::dashed("as stated (mean)", Vec::new());
-    for (bin, x) in bins.iter().zip(1..).filter(|(bin, _)| bin.count > 0) {
-        let (x, of) = (f64::from(x), bin.count as f64);
-        let mean = 100.0 * bin.said.unwrap_or_default();
-        let share = 100.0 * bin.right as f64 / of;
-        let (low, high) = wilson(bin.right, bin.count);
-        right.points.push((x, share));
-        right.bars.push((100.0 * low, 100.0 * high));
-        right.labels.push(format!("{share:.1}"));
-        right.says.push(format!(
-            "said {}: right {} of {} times ({share:.1} %, from {:.1} to {:.1} %); said {mean:.2} % on average",
-            range(bin),
-            bin.right,
-            bin.count,
-            100.0 * low,
-            100.0 * high,
-        ));
-        said.points.push((x, mean));
-    }
-    let text = |x: f64| {
-        let bin = bins.get((x.round() as usize).wrapping_sub(1));
-        bin.map_or_else(String::new, range)
-    };
-    let about = "Counted after every slide until the exploration ended; slides of one exploration are not independent, \
-                 so the bars are rather too short.";
-    Chart {
-        about: about.to_owned(),
-        y_range: (0.0, 108.0),
-        x_marks: bins.len(),
-        x_text: &text,
-        below: "Points below the dashed line: it said more than was so.",
-        ..Chart::new(
-            "How often it is right when it says so",
-            "probability that was said of the most probable (%)",
-            "how often that was right (%)",
-            (0.5, bins.len() as f64 + 0.5),
-            vec![said, right],
-        )
-    }
-    .figure("reliability")
-}
-
-/// The probabilities that are counted together, in %.
-fn range(bin: &Statements) -> String {
-    match (percent(bin.from), percent(bin.to)) {
-        (0.0, high) => format!("<{high}"),
-        (low, 100.0) => format!("\u{2265}{low}"),
-        (low, high) => format!("{low}\u{2013}{high}"),
-    }
 }

@@ -1,22 +1,25 @@
-//! Pictures of an exploration: the course of the posterior, the spectrum beside its two best candidates, and one slide.
+//! Picture of an exploration: the course of the posterior.
 
 use std::fmt::Display;
 
-use tactus_core::features::Observation;
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Table};
 use tactus_core::wire::Event;
 
 use crate::chart::{Chart, DrawError, Figure, MARKS, Series};
-use crate::pictures::spectrum::{self, Counted};
 
 /// Textures that were never more probable than this have no line of their own.
 const LIKELY: f32 = 0.05;
 /// Most lines.
 const MOST: usize = 6;
 
+struct Counted {
+    action: Action,
+    /// of every texture of the table
+    posterior: Vec<f32>,
+}
+
 /// The slides of an exploration that counted, as they come.
-#[derive(Clone, Debug)]
 pub struct Exploration<'t> {
     table: Table<'t>,
     slides: Vec<Counted>,
@@ -38,10 +41,9 @@ impl<'t> Exploration<'t> {
 
     /// Takes a step of it.
     pub fn step<E: Display>(&mut self, step: &ExplorationStep<'_, E>) {
-        if let ExplorationStep::Measured(action, measurement, posterior) = step {
+        if let ExplorationStep::Measured(action, _, posterior) = step {
             self.slides.push(Counted {
                 action: *action,
-                observed: Observation::from(*measurement),
                 posterior: posterior.to_vec(),
             });
         }
@@ -50,31 +52,25 @@ impl<'t> Exploration<'t> {
     /// Takes a probe's event of it; ignores any other.
     pub fn event(&mut self, event: &Event) {
         if let Event::SlideReport {
-            action,
-            observed,
-            posterior,
-            ..
+            action, posterior, ..
         } = event
         {
             self.slides.push(Counted {
                 action: *action,
-                observed: observed.observation(),
                 posterior: posterior.to_vec(),
             });
         }
     }
 
-    /// Its pictures; none, if no slide counted.
+    /// Its picture; none, if no slide counted.
     ///
     /// # Errors
     /// See [`DrawError`].
     pub fn figures(&self, threshold: f32) -> Result<Vec<Figure>, DrawError> {
-        if self.slides.is_empty() {
-            return Ok(Vec::new());
+        match self.slides.is_empty() {
+            true => Ok(Vec::new()),
+            false => Ok(vec![self.posterior(threshold)?]),
         }
-        let mut figures = vec![self.posterior(threshold)?];
-        figures.extend(spectrum::figure(self.table, &self.slides, &self.best())?);
-        Ok(figures)
     }
 
     /// The textures, the most probable one at the end first, and how probable they are.

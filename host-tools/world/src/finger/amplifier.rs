@@ -8,15 +8,13 @@ use crate::maths::{exp, tan};
 use crate::noise::Noise;
 
 /// P_AC for each count, Pa (PAPER: 2.16 mV/Pa, 12 bits over 3.3 V).
-pub const PAC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 2.16;
+pub(crate) const PAC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 2.16;
 /// P_DC for each count, Pa (PAPER: 21.8 mV/kPa).
-pub const PDC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 21.8 * 1000.0;
+const PDC_PA_PER_COUNT: f64 = 3300.0 / 4096.0 / 21.8 * 1000.0;
 /// Pressure of the fluid for each newton on the skin, Pa/N: a P_DC count (PAPER: 36.96 Pa) is 11.5 mN (PAPER fig. 3).
-pub const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
+pub(crate) const PA_PER_N: f64 = PDC_PA_PER_COUNT / N_PER_COUNT;
 /// Noise of P_AC, Pa rms (PAPER: 1.2 mV, given there as 0.52 Pa).
-pub const PAC_NOISE_PA: f64 = 0.52;
-/// Noise of P_AC in recordings of real devices, counts rms (OUT: 4.5 to 5.1).
-pub const PAC_NOISE_FIELD_COUNTS: f64 = 4.8;
+const PAC_NOISE_PA: f64 = 0.52;
 
 /// Band of P_AC, Hz (PAPER).
 const BAND_HZ: (f64, f64) = (10.0, 1040.0);
@@ -37,10 +35,8 @@ const WARM_S: f64 = 60.0;
 /// Ticks from one step of the drift to the next: 10 ms.
 const DRIFT_TICKS: u32 = TICKS_PER_S / 100;
 
-/// The amplifiers and their state.
 pub(in super::super) struct Amplifiers {
     pac_rest: f64,
-    pac_noise_pa: f64,
     pdc_rest: f64,
     /// temperature of the air and of the finger, in counts of P_DC
     air: f64,
@@ -67,7 +63,6 @@ impl Amplifiers {
         let warm = noise.within(DRIFT_COUNTS);
         Self {
             pac_rest,
-            pac_noise_pa: PAC_NOISE_PA,
             pdc_rest,
             air: warm,
             warm,
@@ -81,21 +76,15 @@ impl Amplifiers {
         }
     }
 
-    pub(super) fn set_pac_noise(&mut self, pa: f64) {
-        self.pac_noise_pa = pa;
-    }
-
     /// From now on the gain of P_DC falls to 1/e in this time.
-    pub(super) fn fade_pdc(&mut self, seconds: f64) {
+    pub(in super::super) fn fade_pdc(&mut self, seconds: f64) {
         self.pdc_kept = exp(-TICK_S / seconds);
     }
 
-    /// From now on P_DC has this gain.
-    pub(super) fn weaken_pdc(&mut self, gain: f64) {
+    pub(in super::super) fn weaken_pdc(&mut self, gain: f64) {
         self.pdc_gain = gain;
     }
 
-    /// P_DC has its gain again.
     pub(super) fn mend(&mut self) {
         (self.pdc_gain, self.pdc_kept) = (1.0, 1.0);
     }
@@ -123,9 +112,8 @@ impl Amplifiers {
         counts(between(self.pac, fraction) + self.pac_noise(noise))
     }
 
-    /// Noise of a P_AC sample, counts.
     pub(super) fn pac_noise(&self, noise: &mut Noise) -> f64 {
-        self.pac_noise_pa / PAC_PA_PER_COUNT * noise.normal()
+        PAC_NOISE_PA / PAC_PA_PER_COUNT * noise.normal()
     }
 
     /// Reading of the converter at a P_AC so far from its rest, counts, and true if it was cut.
@@ -143,7 +131,6 @@ pub(super) fn between([a, b]: [f64; 2], fraction: f64) -> f64 {
     a + (b - a) * fraction.clamp(0.0, 1.0)
 }
 
-/// Reading of the converter.
 fn counts(value: f64) -> u16 {
     value.round().clamp(0.0, FULL) as u16
 }

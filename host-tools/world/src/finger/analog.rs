@@ -35,7 +35,7 @@ const CELL_NOISE_V: f64 = 0.24e-3;
 
 /// The finger's transducers.
 pub(in super::super) struct Analog {
-    cell: Cell,
+    pub(super) cell: Cell,
     high_pass: HighPass,
     low_pass: LowPass,
     offset_v: f64,
@@ -56,10 +56,6 @@ impl Analog {
             pac_v: [offset_v; 2],
             wire_cut: false,
         }
-    }
-
-    pub(super) fn cell(&mut self) -> &mut Cell {
-        &mut self.cell
     }
 
     pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {

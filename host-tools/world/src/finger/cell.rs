@@ -24,7 +24,6 @@ const ACROSS: f64 = 0.02;
 const DRIFT_N: f64 = 0.006;
 const DRIFT_S: f64 = 600.0;
 
-/// The cell.
 #[derive(Clone, Debug)]
 pub(in super::super) struct Cell {
     zero_n: f64,
@@ -33,7 +32,7 @@ pub(in super::super) struct Cell {
     spring_n: f64,
     rate: f64,
     /// Response to a newton, relative to a sound cell's; below 0 where wires are exchanged.
-    gain: f64,
+    pub(super) gain: f64,
     /// The output, share of the supply, at the last two ticks.
     ratio: [f64; 2],
 }
@@ -49,11 +48,6 @@ impl Cell {
             gain: 1.0,
             ratio: [(zero_n - TIP_N) * RATIO_PER_N; 2],
         }
-    }
-
-    /// Sets the response to a newton, relative to a sound cell's.
-    pub(super) fn set_gain(&mut self, gain: f64) {
-        self.gain = gain;
     }
 
     pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {

@@ -24,11 +24,12 @@ const G: f64 = 9.806_65;
 
 /// The finger's transducers.
 pub(in super::super) struct Mems {
-    cell: Cell,
+    pub(super) cell: Cell,
     /// Place of the mass against the core, m, and its speed.
     place: f64,
     speed: f64,
-    acceleration_g: f64,
+    /// along the press with gravity, g
+    pub(in super::super) acceleration_g: f64,
 }
 
 impl Mems {
@@ -39,10 +40,6 @@ impl Mems {
             speed: 0.0,
             acceleration_g: 1.0,
         }
-    }
-
-    pub(super) fn cell(&mut self) -> &mut Cell {
-        &mut self.cell
     }
 
     pub(super) fn tick(&mut self, stimulus: &Stimulus, noise: &mut Noise) {
@@ -63,11 +60,6 @@ impl Mems {
     #[cfg(test)]
     pub(super) fn feed(&mut self, g: f64) {
         self.acceleration_g = g;
-    }
-
-    /// Acceleration along the press with gravity, g.
-    pub(in super::super) fn acceleration_g(&self) -> f64 {
-        self.acceleration_g
     }
 
     /// The cell's output at the last tick, share of its supply.

@@ -3,7 +3,7 @@
 use crate::conditions::TICK_S;
 
 /// Contact force for each count of P_DC, N (PAPER fig. 3).
-pub const N_PER_COUNT: f64 = 0.0115;
+pub(crate) const N_PER_COUNT: f64 = 0.0115;
 
 /// Stiffness on the fluid, N/mm^1.5: a Hertz contact. Chosen: 0.2 N at 0.34 mm and 2 N at 1.6 mm.
 const FLUID_N: f64 = 1.0;
@@ -17,7 +17,6 @@ const RELAXING: f64 = 0.03;
 /// Time of that, s (chosen).
 const RELAX_S: f64 = 1.5;
 
-/// State of the skin.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Skin {
     /// indentation of the skin alone, mm
@@ -44,7 +43,6 @@ impl Skin {
         self.remember();
     }
 
-    /// A tick off the surface.
     pub(super) fn lift(&mut self) {
         (self.mm, self.fluid_n, self.elastic_n) = (0.0, 0.0, 0.0);
         self.remember();

@@ -11,7 +11,6 @@ pub(in super::super) struct Stimulus {
     pub(in super::super) vibration_n: f64,
     /// Shear on the skin, N.
     pub(in super::super) shear_n: f64,
-    /// Motion and direction of the mounting.
     pub(in super::super) held: Held,
 }
 
@@ -19,7 +18,7 @@ pub(in super::super) struct Stimulus {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Held {
     /// Acceleration of the mounting towards the sample, g.
-    pub acceleration_g: f64,
+    pub(crate) acceleration_g: f64,
     /// Share of gravity in that direction: 1 hanging straight down.
     pub down: f64,
 }

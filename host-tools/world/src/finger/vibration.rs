@@ -93,7 +93,7 @@ impl Vibrations {
         wear: f64,
     ) -> f64 {
         let ridges = 1.0 - (1.0 - WITHOUT_RIDGES) * wear;
-        let texture = surface.texture();
+        let texture = &surface.texture;
         self.passed = amplitude * ridges * (1.0 - texture.damping) * texture.passed(load_n);
         self.load_n = load_n;
         let at = [x_mm, self.patch_mm(), wear];
@@ -111,7 +111,6 @@ impl Vibrations {
         self.contact_um = None;
     }
 
-    /// Half length of the contact patch.
     fn patch_mm(&self) -> f64 {
         self.patch_mm.clamp(RIDGE_MM, PATCH_MAX_MM)
     }
@@ -126,7 +125,7 @@ impl Vibrations {
         shear_n: f64,
         white: [f64; 2],
     ) -> f64 {
-        let texture = surface.texture();
+        let texture = &surface.texture;
         if self.tune_in == 0 {
             let hz = texture.impulse_centre_hz(speed, self.load_n);
             self.centre = (TAU * TICK_S * hz).min(1.0);
@@ -141,7 +140,7 @@ impl Vibrations {
         let per_ms = speed / texture.fine_mm * 1e-3;
         let rate = per_ms / (1.0 + per_ms / IMPULSES_PER_MS);
         let impulses = IMPULSE_PA
-            * surface.unresolved_um()
+            * surface.unresolved_um
             * surface.amplitude(x_mm)
             * rate.sqrt()
             * self.impulse[1];

@@ -63,21 +63,21 @@ fn each_step_is_five_eighths_of_a_micrometre() {
     let mut bench = Bench::at(8.0);
     bench.turn_to(true);
     bench.steps(100, 800.0); // takes up the play
-    let from = bench.lever.height_mm();
+    let from = bench.lever.height_mm;
     for steps in [1_u32, 7, 64, 800, 3_200] {
-        let from = bench.lever.height_mm();
+        let from = bench.lever.height_mm;
         bench.steps(steps, 800.0);
-        let way = from - bench.lever.height_mm();
+        let way = from - bench.lever.height_mm;
         let ideal = f64::from(steps) * STEP_UM * 1e-3;
         assert!((way - ideal).abs() <= 2.0 * STEP_ERROR_MM, "{steps}: {way}");
     }
     assert!((bench.lever.missing_steps()).abs() < 1e-9);
     // an error that does not accumulate: whole periods are exact
-    let way = from - bench.lever.height_mm();
+    let way = from - bench.lever.height_mm;
     assert!((way - 4_072.0 * STEP_UM * 1e-3).abs() < 2.0 * STEP_ERROR_MM);
-    let from = bench.lever.height_mm();
+    let from = bench.lever.height_mm;
     bench.steps(640, 800.0);
-    assert!((from - bench.lever.height_mm() - 0.4).abs() < 1e-9);
+    assert!((from - bench.lever.height_mm - 0.4).abs() < 1e-9);
 }
 
 #[test]
@@ -87,9 +87,9 @@ fn every_step_moves_the_tip_the_way_it_should() {
     bench.steps(100, 800.0);
     let mut errors = Vec::new();
     for _ in 0..128 {
-        let before = bench.lever.height_mm();
+        let before = bench.lever.height_mm;
         bench.steps(1, 800.0);
-        let way_um = (before - bench.lever.height_mm()) * 1e3;
+        let way_um = (before - bench.lever.height_mm) * 1e3;
         assert!(way_um > 0.0, "{way_um}");
         errors.push(way_um - STEP_UM);
     }
@@ -110,26 +110,22 @@ fn a_reversal_has_to_cross_the_play() {
     let mut bench = Bench::at(8.0);
     bench.turn_to(true);
     bench.steps(200, 800.0);
-    let lowest = bench.lever.height_mm();
+    let lowest = bench.lever.height_mm;
     bench.turn_to(false);
     bench.steps(20, 800.0);
-    assert_eq!(
-        bench.lever.height_mm(),
-        lowest,
-        "20 steps are 12.5 um of 15"
-    );
+    assert_eq!(bench.lever.height_mm, lowest, "20 steps are 12.5 um of 15");
     bench.steps(20, 800.0);
-    let up_um = (bench.lever.height_mm() - lowest) * 1e3;
+    let up_um = (bench.lever.height_mm - lowest) * 1e3;
     assert!((up_um - (25.0 - BACKLASH_UM)).abs() < 1.1, "{up_um}");
 
     // a pressed finger keeps it closed
     bench.turn_to(true);
     bench.steps(200, 800.0);
     bench.load_n = 0.5;
-    let lowest = bench.lever.height_mm();
+    let lowest = bench.lever.height_mm;
     bench.turn_to(false);
     bench.steps(16, 800.0);
-    let up_um = (bench.lever.height_mm() - lowest) * 1e3;
+    let up_um = (bench.lever.height_mm - lowest) * 1e3;
     assert!((up_um - 10.0).abs() < 1.1, "{up_um}");
 }
 
@@ -139,7 +135,7 @@ fn pulses_that_break_the_timing_are_no_steps() {
     bench.turn_to(true);
     bench.steps(100, 800.0);
     for (high_ns, low_ns) in [(3_900, 1_250_000), (1_250_000, 3_900)] {
-        let (missing, bad) = (bench.lever.missing_steps(), bench.lever.bad_pulses());
+        let (missing, bad) = (bench.lever.missing_steps(), bench.lever.bad_pulses);
         for _ in 0..10 {
             bench.pulse(high_ns, low_ns);
         }
@@ -147,7 +143,7 @@ fn pulses_that_break_the_timing_are_no_steps() {
         bench.pulse(10_000, 1_000_000);
         let (missing, bad) = (
             bench.lever.missing_steps() - missing,
-            bench.lever.bad_pulses() - bad,
+            bench.lever.bad_pulses - bad,
         );
         // a low level is between two pulses: the first one after a long one is good
         let expected = if high_ns < 4_000 { 10 } else { 9 };
@@ -175,7 +171,7 @@ fn the_first_step_may_come_at_once() {
     lever.dir(0, true);
     lever.step(1_000, true, 0.0);
     lever.step(6_000, false, 0.0);
-    assert_eq!((lever.missing_steps(), lever.bad_pulses()), (0.0, 0));
+    assert_eq!((lever.missing_steps(), lever.bad_pulses), (0.0, 0));
 }
 
 #[test]
@@ -234,17 +230,17 @@ fn the_switch_at_the_top_has_a_hysteresis_and_the_hard_stop_takes_the_steps() {
     while !bench.lever.at_top() {
         bench.steps(1, 3_200.0);
     }
-    let closes_mm = TOP_MM - bench.lever.height_mm();
+    let closes_mm = TOP_MM - bench.lever.height_mm;
     assert!((closes_mm - LIMIT_MM).abs() < 1.1e-3, "{closes_mm}");
     bench.turn_to(true);
     while bench.lever.at_top() {
         bench.steps(1, 3_200.0);
     }
-    let opens_mm = TOP_MM - bench.lever.height_mm();
+    let opens_mm = TOP_MM - bench.lever.height_mm;
     assert!((opens_mm - LIMIT_MM - LIMIT_HYSTERESIS_MM).abs() < 1.1e-3);
     bench.turn_to(false);
     bench.steps(1_600, 3_200.0); // 1 mm: 0.45 mm beyond the stop
-    assert!(bench.lever.height_mm() <= TOP_MM + BACKLASH_UM * 1e-3);
+    assert!(bench.lever.height_mm <= TOP_MM + BACKLASH_UM * 1e-3);
     assert!(bench.lever.missing_steps() < -600.0);
 }
 
@@ -253,22 +249,22 @@ fn without_current_it_stays_where_it_is_whatever_pushes() {
     let mut bench = Bench::at(2.0);
     bench.turn_to(true);
     bench.steps(160, 800.0);
-    let held = bench.lever.height_mm();
+    let held = bench.lever.height_mm;
     assert!(!bench.lever.turn_by_hand(0.1, 0.0), "the motor holds");
     for load_n in [0.5, 2.1, 12.0, 50.0] {
         bench.load_n = load_n;
         bench.lever.enable(false, load_n);
         bench.wait_ms(1_000);
-        assert_eq!(bench.lever.height_mm(), held, "{load_n} N");
+        assert_eq!(bench.lever.height_mm, held, "{load_n} N");
     }
     // but for its knob
     assert!(bench.lever.turn_by_hand(0.05, 2.1));
-    let up_mm = bench.lever.height_mm() - held;
+    let up_mm = bench.lever.height_mm - held;
     assert!((up_mm - 0.05).abs() < 2e-3, "{up_mm}");
     // with the current, the rotor snaps to the nearest place that fits
-    let held = bench.lever.height_mm();
+    let held = bench.lever.height_mm;
     bench.lever.enable(true, 2.1);
-    let snapped = bench.lever.height_mm();
+    let snapped = bench.lever.height_mm;
     assert!((snapped - held).abs() <= 0.5 * PERIOD as f64 * STEP_UM * 1e-3 + STEP_ERROR_MM);
     assert_eq!((bench.lever.missing_steps()) % 64.0, 0.0);
 }
@@ -277,15 +273,15 @@ fn without_current_it_stays_where_it_is_whatever_pushes() {
 fn an_inverted_dir_turns_every_step_round() {
     let mut bench = Bench::at(8.0);
     bench.turn_to(true);
-    bench.lever.invert_dir(true);
+    bench.lever.inverted = true;
     bench.steps(100, 800.0);
-    let from = bench.lever.height_mm();
+    let from = bench.lever.height_mm;
     bench.steps(800, 800.0);
-    let up_mm = bench.lever.height_mm() - from;
+    let up_mm = bench.lever.height_mm - from;
     assert!((up_mm - 0.5).abs() < 2e-3, "{up_mm}");
-    bench.lever.invert_dir(false);
+    bench.lever.inverted = false;
     bench.steps(1_600, 800.0);
-    assert!(bench.lever.height_mm() < from);
+    assert!(bench.lever.height_mm < from);
 }
 
 #[test]
@@ -328,27 +324,27 @@ fn it_hums_differently_at_every_stop_and_not_without_current() {
 fn lost_steps_and_a_runaway_show_in_the_tip_alone() {
     let mut bench = Bench::at(8.0);
     bench.turn_to(true);
-    bench.lever.lose_steps(0.1);
+    bench.lever.lost_share = 0.1;
     bench.steps(2_000, 800.0);
     let missing = bench.lever.missing_steps();
     assert!((150.0..250.0).contains(&missing), "{missing}");
 
-    bench.lever.lose_steps(0.0);
-    let from = bench.lever.height_mm();
+    bench.lever.lost_share = 0.0;
+    let from = bench.lever.height_mm;
     bench.lever.run_away_down(true);
     bench.wait_ms(1_000);
-    let down = from - bench.lever.height_mm();
+    let down = from - bench.lever.height_mm;
     assert!((down - 0.5).abs() < 3e-3, "{down}");
     // commanded to go up twice as fast, it gives in after more steps than it made
     bench.turn_to(false);
     bench.steps(1_700, 1_600.0);
-    let turned = bench.lever.height_mm();
+    let turned = bench.lever.height_mm;
     bench.wait_ms(500);
-    assert_eq!(bench.lever.height_mm(), turned);
+    assert_eq!(bench.lever.height_mm, turned);
     // and without current at once
     bench.lever.run_away_down(true);
     bench.lever.enable(false, 0.0);
     bench.lever.enable(true, 0.0);
     bench.wait_ms(100);
-    assert!((bench.lever.height_mm() - turned).abs() < 0.021);
+    assert!((bench.lever.height_mm - turned).abs() < 0.021);
 }

@@ -5,13 +5,13 @@ use super::bus::{ClockMode, FLOATING, Late};
 use crate::noise::Noise;
 
 /// From power-up to the first command, ns (8.4.1: 50 us).
-pub const POWER_UP_NS: u64 = 50_000;
+pub(crate) const POWER_UP_NS: u64 = 50_000;
 /// A period of its clock, ns (4.096 MHz).
 const CLOCK_NS: f64 = 1e9 / 4.096e6;
 /// Conversions in a second by the code in CONFIG1, normal mode; twice as many in turbo mode (8.6).
 const RATES_HZ: [f64; 8] = [20.0, 45.0, 90.0, 175.0, 330.0, 600.0, 1000.0, 1000.0];
 /// Its clock is off by no more (6.5).
-pub const CLOCK_SHARE: f64 = 0.02;
+pub(crate) const CLOCK_SHARE: f64 = 0.02;
 /// Noise at gain 128 and 1000 conversions a second, V rms (7.1 has some 0.9 uV; the root of the rate below: chosen).
 const NOISE_V: f64 = 0.9e-6;
 /// Supply and, with VREF = 3, reference, V.
@@ -20,7 +20,6 @@ const SUPPLY_V: f64 = 3.3;
 const INTERNAL_V: f64 = 2.048;
 const FULL: f64 = 8_388_607.0;
 
-/// The meaning of this select's bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Says {
     Command,
@@ -29,14 +28,14 @@ enum Says {
     Write { register: u8, left: u8 },
 }
 
-/// The converter with its cell.
 #[derive(Clone, Debug)]
-pub struct Ads1220 {
+pub(crate) struct Ads1220 {
     registers: [u8; 4],
     noise: Noise,
-    clock: f64,
+    pub(super) clock: f64,
     ready_ns: u64,
-    wire_cut: bool,
+    /// a signal wire is broken: the input drifts to an end of the range (chosen: the bias current of the amplifier)
+    pub(super) wire_cut: bool,
     /// A conversion under way: its begin and end; its sum so far, and the time of that.
     converts: Option<(u64, u64)>,
     sum: (f64, f64),
@@ -49,12 +48,13 @@ pub struct Ads1220 {
     wrong_phase: Option<Late>,
     says: Says,
     shown: [u8; 3],
-    complaints: u64,
+    /// commands that do not exist, and reserved bits that were written, so far
+    pub(super) complaints: u64,
 }
 
 impl Ads1220 {
     /// One that gets its power at time 0, its clock within what the data sheet promises.
-    pub fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         let mut noise = Noise::new(seed, 611);
         let clock = noise.between(-CLOCK_SHARE, CLOCK_SHARE);
         Self {
@@ -77,31 +77,11 @@ impl Ads1220 {
     }
 
     /// Its supply dips: all registers are 0, and it waits for a command (8.4.1).
-    pub fn brown_out(&mut self, now_ns: u64) {
+    pub(super) fn brown_out(&mut self, now_ns: u64) {
         self.registers = [0; 4];
         self.converts = None;
         self.code = 0;
         self.ready_ns = now_ns + POWER_UP_NS;
-    }
-
-    /// Its clock is off by this share.
-    pub fn set_clock(&mut self, share: f64) {
-        self.clock = share;
-    }
-
-    /// A signal wire breaks: the input drifts to an end of the range (chosen: the bias current of the amplifier).
-    pub fn cut_wire(&mut self) {
-        self.wire_cut = true;
-    }
-
-    /// It is whole again.
-    pub fn mend_wire(&mut self) {
-        self.wire_cut = false;
-    }
-
-    /// Commands that do not exist, and reserved bits that were written, so far.
-    pub fn complaints(&self) -> u64 {
-        self.complaints
     }
 
     fn is_continuous(&self) -> bool {
@@ -118,7 +98,7 @@ impl Ads1220 {
     }
 
     /// A tick of the world, at whose end the cell's output is this share of its supply.
-    pub fn tick(&mut self, now_ns: u64, ratio: f64) {
+    pub(super) fn tick(&mut self, now_ns: u64, ratio: f64) {
         self.ratio = ratio;
         let seconds = now_ns.saturating_sub(self.tick_ns) as f64 * 1e-9;
         self.tick_ns = now_ns;
@@ -165,19 +145,19 @@ impl Ads1220 {
 
     /// Chip select falls: a new command (8.5.1.1). Only mode 1 works: DIN is taken as the clock falls (8.5.1); in modes
     /// 0 and 3 it is taken half a clock late, so that both lines come a bit late (chosen); in mode 2, as in mode 1.
-    pub fn select(&mut self, now_ns: u64, mode: ClockMode) {
+    pub(super) fn select(&mut self, now_ns: u64, mode: ClockMode) {
         self.heard = now_ns >= self.ready_ns;
         self.wrong_phase = mode.on_rising().then(Late::default);
         self.says = Says::Command;
     }
 
     /// Chip select rises: the interface is reset.
-    pub fn deselect(&mut self) {
+    pub(super) fn deselect(&mut self) {
         self.heard = false;
     }
 
     /// A byte.
-    pub fn byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
+    pub(super) fn byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
         if !self.heard {
             return FLOATING;
         }

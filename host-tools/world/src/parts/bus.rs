@@ -7,9 +7,9 @@ pub(super) const FLOATING: u8 = 0xFF;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ClockMode {
     /// The clock is high between transfers.
-    pub idle_high: bool,
+    pub(crate) idle_high: bool,
     /// Bits are taken on the second edge.
-    pub second_edge: bool,
+    pub(crate) second_edge: bool,
 }
 
 impl ClockMode {
@@ -22,7 +22,7 @@ impl ClockMode {
     }
 
     /// Bits are taken while the clock rises.
-    pub const fn on_rising(self) -> bool {
+    pub(crate) const fn on_rising(self) -> bool {
         self.idle_high == self.second_edge
     }
 }
@@ -35,12 +35,10 @@ pub(super) struct Late {
 }
 
 impl Late {
-    /// The byte as the part gets it.
     pub(super) fn hear(&mut self, mosi: u8) -> u8 {
         u8::from(std::mem::replace(&mut self.mosi, mosi & 1 != 0)) << 7 | mosi >> 1
     }
 
-    /// The part's byte as the master gets it.
     pub(super) fn say(&mut self, miso: u8) -> u8 {
         u8::from(std::mem::replace(&mut self.miso, miso & 1 != 0)) << 7 | miso >> 1
     }

@@ -7,7 +7,7 @@ use crate::maths::tan;
 use crate::noise::Noise;
 
 /// From power-up to the first register that can be read, ns (ST's examples wait 10 ms).
-pub const BOOT_NS: u64 = 10_000_000;
+pub(crate) const BOOT_NS: u64 = 10_000_000;
 /// Duration of a software reset, ns (AN5444: 50 us).
 const RESET_NS: u64 = 50_000;
 /// From power-on of the measurement to data, ns (chosen: 10 ms, AN5444 speaks of samples to discard).
@@ -47,13 +47,12 @@ const CTRL3_RESET: u8 = 0x04;
 
 /// The accelerometer, of which Z is what counts here.
 #[derive(Clone, Debug)]
-pub struct Iis3dwb {
+pub(crate) struct Iis3dwb {
     registers: [u8; 128],
     noise: Noise,
-    /// Share that its clock is off by.
     clock: f64,
     /// Error of its scale, as a share, and its reading at 0, g: pieces differ (how far could not be read in DS12569).
-    scale: (f64, f64),
+    pub(super) scale: (f64, f64),
     powered_ns: u64,
     on_since_ns: Option<u64>,
     resets_until_ns: u64,
@@ -69,7 +68,7 @@ pub struct Iis3dwb {
     heard: bool,
     address: Option<(u8, bool)>,
     /// Writes to bits that must not change.
-    complaints: u64,
+    pub(super) complaints: u64,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -101,7 +100,7 @@ impl LowPass {
 
 impl Iis3dwb {
     /// One that gets its power at time 0.
-    pub fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         let mut part = Self {
             registers: [0; 128],
             noise: Noise::new(seed, 610),
@@ -132,26 +131,16 @@ impl Iis3dwb {
     }
 
     /// Its supply dips.
-    pub fn brown_out(&mut self, now_ns: u64) {
+    pub(super) fn brown_out(&mut self, now_ns: u64) {
         self.reset();
         self.powered_ns = now_ns;
     }
 
     /// Its clock is off by this share.
-    pub fn set_clock(&mut self, share: f64) {
+    pub(super) fn set_clock(&mut self, share: f64) {
         self.clock = share;
         let corner = self.corner_hz;
         self.low_pass.tune(corner * (1.0 + share));
-    }
-
-    /// Its scale is off by this share, and its zero by so much, g.
-    pub fn set_scale(&mut self, share: f64, zero_g: f64) {
-        self.scale = (share, zero_g);
-    }
-
-    /// Writes to reserved bits so far.
-    pub fn complaints(&self) -> u64 {
-        self.complaints
     }
 
     fn configure(&mut self, now_ns: u64) {
@@ -176,7 +165,7 @@ impl Iis3dwb {
     }
 
     /// A tick of the world, at whose end Z feels this, g.
-    pub fn tick(&mut self, now_ns: u64, g: f64) {
+    pub(super) fn tick(&mut self, now_ns: u64, g: f64) {
         let one_axis = self.registers[0x15] & 3 != 0;
         let density = if one_axis { NOISE.0 } else { NOISE.1 };
         // white up to half of the tick rate
@@ -200,7 +189,7 @@ impl Iis3dwb {
 
     /// Chip select falls. SDI is taken as the clock rises, in modes 0 and 3 (chosen: DS12569 draws mode 3 only); in the
     /// others it changes just then, and the address is nonsense (chosen: nothing is answered, nothing written).
-    pub fn select(&mut self, now_ns: u64, mode: ClockMode) {
+    pub(super) fn select(&mut self, now_ns: u64, mode: ClockMode) {
         self.heard = mode.on_rising()
             && now_ns >= self.powered_ns + BOOT_NS
             && now_ns >= self.resets_until_ns;
@@ -208,12 +197,12 @@ impl Iis3dwb {
     }
 
     /// Chip select rises.
-    pub fn deselect(&mut self) {
+    pub(super) fn deselect(&mut self) {
         self.heard = false;
     }
 
     /// A byte: the address, or data.
-    pub fn byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
+    pub(super) fn byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
         if !self.heard {
             return FLOATING;
         }

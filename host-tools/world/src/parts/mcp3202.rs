@@ -3,12 +3,10 @@
 use super::bus::{ClockMode, FLOATING};
 
 /// Highest reading of 12 bits.
-pub const FULL: u16 = 4095;
+pub(crate) const FULL: u16 = 4095;
 
-/// The stage of a conversion.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum State {
-    /// Before the start bit.
     #[default]
     Waits,
     /// So many of SGL/DIFF, ODD/SIGN and MSBF have come.
@@ -19,37 +17,31 @@ enum State {
     Over(u8),
 }
 
-/// The converter.
 #[derive(Clone, Debug, Default)]
-pub struct Mcp3202 {
+pub(crate) struct Mcp3202 {
     state: State,
     config: u8,
     reading: u16,
     /// chip select is low, in a mode that it works in
     on: bool,
-    unplugged: bool,
+    pub(super) unplugged: bool,
 }
 
 impl Mcp3202 {
-    /// Its plug is out.
-    pub fn unplug(&mut self) {
-        self.unplugged = true;
-    }
-
     /// Chip select falls. Modes 0 and 3 work (features: "modes 0,0 and 1,1"); in the others DIN changes as it is taken,
     /// and no start bit is where it should be (chosen: none is heard).
-    pub fn select(&mut self, mode: ClockMode) {
+    pub(super) fn select(&mut self, mode: ClockMode) {
         self.on = mode.on_rising() && !self.unplugged;
         self.state = State::Waits;
     }
 
     /// Chip select rises: the conversion ends (3.2).
-    pub fn deselect(&mut self) {
+    pub(super) fn deselect(&mut self) {
         self.on = false;
     }
 
     /// A byte, most significant bit first. `sample` gives what an input reads when it is sampled.
-    pub fn byte(&mut self, mosi: u8, mut sample: impl FnMut(u8) -> u16) -> u8 {
+    pub(super) fn byte(&mut self, mosi: u8, mut sample: impl FnMut(u8) -> u16) -> u8 {
         if !self.on {
             return FLOATING;
         }

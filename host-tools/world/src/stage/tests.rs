@@ -1,8 +1,9 @@
 use super::*;
+use crate::tests::bench::{correlation, deviation};
 
 fn stage_at(position_mm: f64) -> Stage {
     let mut stage = Stage::new(position_mm, 1, 2);
-    stage.enable(true);
+    stage.enabled = true;
     stage
 }
 
@@ -22,15 +23,15 @@ fn plain() -> Stage {
 
 /// Means over a window that begins at 20 mm and is whole revolutions long.
 fn steady(stage: &mut Stage, shear_n: f64, window_mm: f64) -> (f64, f64) {
-    while stage.position_mm() < 20.0 {
+    while stage.position_mm < 20.0 {
         stage.tick(shear_n);
-        assert!(stage.speed_mm_s() < 200.0);
+        assert!(stage.speed_mm_s < 200.0);
     }
     let (mut ticks, mut current) = (0.0, 0.0);
-    while stage.position_mm() < 20.0 + window_mm {
+    while stage.position_mm < 20.0 + window_mm {
         stage.tick(shear_n);
         ticks += 1.0;
-        current += stage.current_a();
+        current += stage.current_a;
     }
     (window_mm / (ticks * TICK_S), current / ticks)
 }
@@ -51,15 +52,6 @@ fn a_duty_gives_the_speed_and_the_current_of_the_equations() {
 }
 
 #[test]
-fn direction_follows_the_sign_of_the_duty() {
-    let mut stage = stage_at(40.0);
-    stage.set_duty(-0.1);
-    run(&mut stage, 0.2, 0.0);
-    assert!(stage.speed_mm_s() < -40.0 && stage.current_a() < 0.0);
-    assert!(stage.position_mm() < 35.0);
-}
-
-#[test]
 fn speed_rises_with_the_time_constant_of_mass_and_motor() {
     // without dry friction v = v_end (1 - exp(-t / tau)), tau = mass / (K^2 / R + b) = 1.2343 / 37.858 = 32.6 ms
     let mut stage = Stage {
@@ -70,43 +62,35 @@ fn speed_rises_with_the_time_constant_of_mass_and_motor() {
     stage.set_duty(0.2);
     run(&mut stage, 0.0326, 0.0);
     // v_end = 5.2477 / 37.858 = 138.6 mm/s; torque ripple of 2 % aside
-    let share = stage.speed_mm_s() / 138.6;
+    let share = stage.speed_mm_s / 138.6;
     assert!((share - 0.632).abs() < 0.02, "{share}");
 }
 
 /// The paper's inclined stage: weights on it, current at constant speed.
 #[test]
 fn current_is_linear_in_shear() {
-    let points: Vec<(f64, f64)> = (0..=10)
-        .map(|i| {
-            let shear_n = -0.2 * f64::from(i);
-            let mut stage = stage_at(5.0);
-            stage.set_duty(0.25);
-            let (_, current) = steady(&mut stage, shear_n, 40.0);
-            (-shear_n, current)
-        })
-        .collect();
-    let n = points.len() as f64;
-    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let sxx = mean(&|p| (p.0 - x).powi(2));
-    let syy = mean(&|p| (p.1 - y).powi(2));
-    let sxy = mean(&|p| (p.0 - x) * (p.1 - y));
-    let r2 = sxy * sxy / (sxx * syy);
-    assert!(r2 > 0.999, "{r2}");
+    let shears: Vec<f64> = (0..=10).map(|i| 0.2 * f64::from(i)).collect();
+    let current = |shear_n: &f64| {
+        let mut stage = stage_at(5.0);
+        stage.set_duty(0.25);
+        steady(&mut stage, -shear_n, 40.0).1
+    };
+    let currents: Vec<f64> = shears.iter().map(current).collect();
+    let r = correlation(&shears, &currents);
+    assert!(r * r > 0.999, "{r}");
     // the speed falls with the load, and the viscous friction with it: b / (K^2 / R + b) of the slope is 5 %
-    let slope = sxy / sxx * FORCE_N_PER_A;
+    let slope = r * deviation(&currents) / deviation(&shears) * FORCE_N_PER_A;
     assert!((slope - (1.0 - 2.0 / 37.858)).abs() < 0.01, "{slope}");
 }
 
 #[test]
 fn a_jammed_stage_draws_the_stall_current() {
     let mut stage = stage_at(40.0);
-    stage.jam(true);
+    stage.jammed = true;
     stage.set_duty(0.5);
     run(&mut stage, 0.05, 0.0);
-    assert_eq!(stage.position_mm(), 40.0);
-    assert!((stage.current_a() - 6.0 / 7.5).abs() < 1e-12);
+    assert_eq!(stage.position_mm, 40.0);
+    assert!((stage.current_a - 6.0 / 7.5).abs() < 1e-12);
     // 0.8 A at 1 V/A are 993 of 4096 counts over 3.3 V, within the errors of zero and gain
     let counts = i32::from(stage.adc(1)) - 2048 - 993;
     assert!(counts.abs() < 8 + 5 + 6, "{counts}");
@@ -121,10 +105,10 @@ fn a_small_duty_does_not_overcome_the_friction_of_rest() {
     // 0.72 N need 44 mA, 0.33 V, 2.7 %
     stage.set_duty(0.024);
     run(&mut stage, 1.0, 0.0);
-    assert_eq!(stage.position_mm(), 5.0);
+    assert_eq!(stage.position_mm, 5.0);
     stage.set_duty(0.031);
     run(&mut stage, 1.0, 0.0);
-    assert!(stage.position_mm() > 5.5);
+    assert!(stage.position_mm > 5.5);
 }
 
 #[test]
@@ -157,17 +141,17 @@ fn friction_differs_over_the_travel() {
 fn current_has_ripple_of_the_commutation() {
     let mut stage = stage_at(5.0);
     stage.set_duty(0.1);
-    while stage.position_mm() < 30.0 {
+    while stage.position_mm < 30.0 {
         stage.tick(0.0);
     }
     // one commutation per mm: correlate the current over 20 of them
     let (mut re, mut im, mut n, mut mean) = (0.0, 0.0, 0.0, 0.0);
-    while stage.position_mm() < 50.0 {
+    while stage.position_mm < 50.0 {
         stage.tick(0.0);
-        let (sin, cos) = (stage.position_mm() * TAU).sin_cos();
-        re += stage.current_a() * cos;
-        im += stage.current_a() * sin;
-        mean += stage.current_a();
+        let (sin, cos) = (stage.position_mm * TAU).sin_cos();
+        re += stage.current_a * cos;
+        im += stage.current_a * sin;
+        mean += stage.current_a;
         n += 1.0;
     }
     let (ripple, mean) = (2.0 * f64::hypot(re, im) / n, mean / n);
@@ -185,12 +169,12 @@ fn energy_is_accounted_for() {
         for _ in 0..(seconds / TICK_S) as u32 {
             let dry = stage.dry_friction_n();
             stage.tick(-0.3);
-            let v = stage.speed_mm_s() * 1e-3;
-            put_in += duty * SUPPLY_V * stage.current_a() * TICK_S;
-            heat += stage.current_a().powi(2) * RESISTANCE_OHM * TICK_S;
+            let v = stage.speed_mm_s * 1e-3;
+            put_in += duty * SUPPLY_V * stage.current_a * TICK_S;
+            heat += stage.current_a.powi(2) * RESISTANCE_OHM * TICK_S;
             friction += (dry + VISCOUS_N_S_PER_M * v + 0.3) * v * TICK_S;
         }
-        let kinetic = 0.5 * MASS_KG * (stage.speed_mm_s() * 1e-3).powi(2);
+        let kinetic = 0.5 * MASS_KG * (stage.speed_mm_s * 1e-3).powi(2);
         let balance = (heat + friction + kinetic) / put_in;
         assert!((balance - 1.0).abs() < 0.01, "{balance}");
     }
@@ -202,15 +186,15 @@ fn shorted_it_brakes_and_disabled_it_coasts() {
         let mut stage = stage_at(10.0);
         stage.set_duty(0.17);
         run(&mut stage, 0.3, 0.0);
-        assert!((stage.speed_mm_s() - 100.0).abs() < 5.0);
-        let from = stage.position_mm();
+        assert!((stage.speed_mm_s - 100.0).abs() < 5.0);
+        let from = stage.position_mm;
         stage.set_duty(0.0);
-        stage.enable(!disable);
+        stage.enabled = !disable;
         run(&mut stage, 0.001, 0.0);
-        assert_eq!(stage.current_a() == 0.0, disable);
+        assert_eq!(stage.current_a == 0.0, disable);
         run(&mut stage, 0.5, 0.0);
-        assert_eq!(stage.speed_mm_s(), 0.0);
-        stage.position_mm() - from
+        assert_eq!(stage.speed_mm_s, 0.0);
+        stage.position_mm - from
     };
     // coasting: v^2 m / (2 F) = 0.01 * 1.2343 / 1.2 or a little less; shorted: with tau = 32.6 ms
     assert!((7.0..10.5).contains(&way(true)), "{}", way(true));
@@ -229,18 +213,18 @@ fn limit_switches_and_hard_stops() {
         while stage.limits() != limits {
             stage.tick(0.0);
         }
-        assert!((stage.position_mm() - closes_mm).abs() < 0.01);
+        assert!((stage.position_mm - closes_mm).abs() < 0.01);
         run(&mut stage, 1.0, 0.0);
-        assert_eq!((stage.position_mm(), stage.limits()), (stop_mm, limits));
+        assert_eq!((stage.position_mm, stage.limits()), (stop_mm, limits));
         assert!(
-            (stage.current_a().abs() - 1.2 / 7.5).abs() < 0.01,
+            (stage.current_a.abs() - 1.2 / 7.5).abs() < 0.01,
             "pushes against the stop"
         );
         stage.set_duty(-duty);
         while stage.limits() == limits {
             stage.tick(0.0);
         }
-        let opens_mm = (stage.position_mm() - stop_mm).abs();
+        let opens_mm = (stage.position_mm - stop_mm).abs();
         assert!((opens_mm - LIMIT_MM - LIMIT_HYSTERESIS_MM).abs() < 0.01);
         stage.set_duty(0.0);
         run(&mut stage, 0.3, 0.0);
@@ -250,7 +234,7 @@ fn limit_switches_and_hard_stops() {
 #[test]
 fn noise_of_the_reading_is_what_it_says() {
     let mut stage = stage_at(40.0);
-    stage.jam(true);
+    stage.jammed = true;
     stage.set_duty(0.013);
     stage.tick(0.0);
     let readings: Vec<f64> = (0..10_000)
@@ -286,7 +270,7 @@ fn fast_decay_gives_the_current_of_its_equation() {
         (0.7, 50.0),
     ] {
         let mut stage = stage_at(40.0);
-        stage.decay_fast(true);
+        stage.decays_fast = true;
         stage.set_duty(duty);
         stage.speed_mm_s = speed_mm_s;
         let emf_v = stage.along.force_n_per_a * speed_mm_s * 1e-3;
@@ -323,24 +307,24 @@ fn fast_decay_coasts_where_slow_decay_brakes() {
         let mut stage = stage_at(40.0);
         stage.set_duty(0.08);
         run(&mut stage, 0.2, 0.0);
-        assert!(stage.speed_mm_s() > 30.0);
-        let from_mm = stage.position_mm();
-        stage.decay_fast(fast);
+        assert!(stage.speed_mm_s > 30.0);
+        let from_mm = stage.position_mm;
+        stage.decays_fast = fast;
         stage.set_duty(0.0);
         run(&mut stage, 0.002, 0.0);
-        let current_a = stage.current_a();
+        let current_a = stage.current_a;
         run(&mut stage, 0.3, 0.0);
-        assert_eq!(stage.speed_mm_s(), 0.0);
-        (current_a, stage.position_mm() - from_mm)
+        assert_eq!(stage.speed_mm_s, 0.0);
+        (current_a, stage.position_mm - from_mm)
     });
     assert!(slow.0 < -0.05 && fast.0 == 0.0, "{slow:?} {fast:?}");
     assert!(slow.1 < 0.8 && fast.1 > 1.0, "{slow:?} {fast:?}");
     // and at the duty that moves the one, the other stays where it is
     let mut stage = stage_at(40.0);
-    stage.decay_fast(true);
+    stage.decays_fast = true;
     stage.set_duty(0.08);
     run(&mut stage, 0.5, 0.0);
-    assert_eq!(stage.position_mm(), 40.0);
+    assert_eq!(stage.position_mm, 40.0);
 }
 
 /// The vibration has the periods of the screw's turns and of the commutation, the commanded amplitude, and is 0 at
@@ -348,7 +332,7 @@ fn fast_decay_coasts_where_slow_decay_brakes() {
 #[test]
 fn a_vibration_has_its_amplitude_and_its_frequencies() {
     let mut stage = plain();
-    stage.vibrate(2.0);
+    stage.vibration_um = 2.0;
     assert_eq!(stage.heave_mm(), 0.0);
     stage.speed_mm_s = 50.0;
     let heave: Vec<f64> = (0..1000)

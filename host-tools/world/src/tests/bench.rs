@@ -3,11 +3,12 @@
 
 use std::f64::consts::TAU;
 
+use crate::TRIAL_VARIATION;
+use crate::conditions::{TICK_S, TICKS_PER_S};
 use crate::finger::{Contact, Finger};
 use crate::noise::Noise;
 use crate::surface::Surface;
 use crate::textures::draw;
-use crate::{TICK_S, TICKS_PER_S, TRIAL_VARIATION};
 
 /// Samples of P_AC a second.
 pub(super) const RATE: f64 = 2200.0;
@@ -91,7 +92,7 @@ pub(super) fn slide(
         ticks += 1;
         ticks
             .is_multiple_of(SAMPLE_TICKS)
-            .then(|| f64::from(finger.sample_pac(1.0)))
+            .then(|| f64::from(finger.sample_channel(0, 1.0)))
     };
     while finger.force_n() < force_n {
         contact.indentation_mm += APPROACH_MM_S * TICK_S;
@@ -111,7 +112,7 @@ pub(super) fn slide(
     let (mut shear_n, mut mean_n) = (0.0, 0.0);
     let pac = (0..steady)
         .filter_map(|_| {
-            shear_n += finger.shear_n().abs() / f64::from(steady);
+            shear_n += finger.shear_n.abs() / f64::from(steady);
             mean_n += finger.force_n() / f64::from(steady);
             run(&mut contact, finger)
         })
@@ -143,7 +144,6 @@ impl Slide {
     }
 }
 
-/// A new sample of a texture of world `seed`.
 pub(super) fn sample(number: u8, seed: u64) -> Surface {
     Surface::new(&draw(number, seed), seed, TRIAL_VARIATION)
 }
@@ -181,7 +181,6 @@ fn hz(bin: usize) -> f64 {
     bin as f64 * RATE / SECTION as f64
 }
 
-/// Power between two frequencies.
 pub(super) fn band(spectrum: &[f64], from_hz: f64, to_hz: f64) -> f64 {
     (0..spectrum.len())
         .filter(|k| (from_hz..to_hz).contains(&hz(*k)))
@@ -217,13 +216,13 @@ pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     sum / n
 }
 
-pub(super) fn deviation(values: &[f64]) -> f64 {
+pub(crate) fn deviation(values: &[f64]) -> f64 {
     let mean = mean(values.iter().copied());
     let sum: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
     (sum / (values.len() - 1) as f64).sqrt()
 }
 
-pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (ma, mb) = (mean(a.iter().copied()), mean(b.iter().copied()));
     let product: f64 = a.iter().zip(b).map(|(a, b)| (a - ma) * (b - mb)).sum();
     product / (a.len() - 1) as f64 / deviation(a) / deviation(b)

@@ -126,7 +126,6 @@ const ENDS_HZ: [f64; 4] = [10.0, 20.0, 850.0, 1000.0];
 /// Time when the force steps from 0 to 1 N, s.
 const STEP_S: f64 = 0.5;
 
-/// A vibration behind a finger.
 struct Vibration {
     name: FingerName,
     /// Frequency, Hz, gain, dB, and phase in radians without that of the high-pass, going on from the one before.
@@ -174,7 +173,6 @@ impl Vibration {
             assert!((-1.4..0.4).contains(&db), "{name}, {hz} Hz: {db:.2} dB");
         }
         let (low, high) = (self.db(10.0), self.db(1000.0));
-        eprintln!("{name}: {low:.2} dB at 10 Hz, {high:.2} dB at 1000 Hz");
         assert!((-3.6..-2.4).contains(&low), "{name}: {low:.2} dB at 10 Hz");
         assert!(
             (-5.5..-2.0).contains(&high),
@@ -184,7 +182,6 @@ impl Vibration {
         let off = band.map(|(hz, _, phase)| (phase + TAU * hz * self.delay_s).abs());
         let most = off.fold(0.0, f64::max).to_degrees();
         let late_ms = 1e3 * self.delay_s;
-        eprintln!("{name}: {late_ms:.3} ms late, {most:.1} degrees");
         let expected_ms = if name == FingerName::Mems {
             1.4..2.1
         } else {
@@ -213,7 +210,6 @@ fn step(name: FingerName) {
     let half = f64::midpoint(rest, pressed);
     let (at_s, _) = pdc.iter().find(|(s, c)| *s >= STEP_S && *c > half).unwrap();
     let late_ms = 1e3 * (at_s - STEP_S);
-    eprintln!("{name}: {mn:.1} mN, {late_ms:.2} ms late, at rest {rest:.0} counts");
     assert!((mn - 1000.0).abs() < 10.0, "{name}: {mn:.1} mN");
     assert!((0.0..3.0).contains(&late_ms), "{name}: {late_ms} ms");
     let (least, most) = model.at_rest.pdc_counts;
@@ -245,7 +241,6 @@ fn fingers_at_rest_are_as_their_models_say() {
         let rms =
             (pac.iter().map(|(_, c)| (c - mean).powi(2)).sum::<f64>() / pac.len() as f64).sqrt();
         let (least, most) = model.at_rest.pac_noise_counts;
-        eprintln!("{name}: noise {rms:.2} counts");
         assert!(
             (f64::from(least)..f64::from(most)).contains(&rms),
             "{name}: {rms}"

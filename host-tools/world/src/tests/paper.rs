@@ -41,7 +41,6 @@ fn trials(
     textures.iter().map(on).collect()
 }
 
-/// Mean of a property over trials.
 fn level(trials: &[Properties], property: fn(&Properties) -> f64) -> f64 {
     mean(trials.iter().map(property))
 }
@@ -80,7 +79,6 @@ fn centroid_rises_with_speed_for_coarse_textures_only() {
         let rise: Vec<f64> = (0..6)
             .map(|v| mean(worlds.iter().map(|w| w[v][i])).exp())
             .collect();
-        println!("T{number}: {rise:.0?} Hz");
         let consistent = rise.windows(2).all(|w| w[1] > 0.98 * w[0]);
         let ratio = rise[5] / rise[0];
         if COARSE.contains(number) {
@@ -114,7 +112,6 @@ fn ten_textures_are_as_the_paper_describes_them() {
     let rank =
         |values: &[f64], number: u8| values.iter().filter(|v| **v > at(values, number)).count();
     for [traction, roughness, fineness] in &worlds {
-        println!("traction {traction:.2?} roughness {roughness:.1?} fineness {fineness:.2?}");
         // graphite has the lowest traction, polished aluminum and rubber the highest with foam
         assert_eq!(rank(traction, 43), 9);
         assert!(rank(traction, 46) <= 2 && rank(traction, 47) <= 2);
@@ -174,10 +171,7 @@ fn traction_is_best_felt_slow_and_heavy_and_roughness_fast_and_light() {
     let grid = |property: usize| -> [f64; 9] {
         std::array::from_fn(|i| mean(uncertainties.iter().map(|u| u[i][property])))
     };
-    let [traction, roughness, fineness] = [grid(0), grid(1), grid(2)];
-    println!(
-        "0.2, 0.5, 1.26 N by 10, 25, 63 mm/s: traction {traction:.2?} roughness {roughness:.2?} fineness {fineness:.2?}"
-    );
+    let [traction, roughness] = [grid(0), grid(1)];
     let row = |g: &[f64; 9], i: usize| mean(g[3 * i..3 * i + 3].iter().copied());
     let column = |g: &[f64; 9], i: usize| mean((0..3).map(|k| g[3 * k + i]));
     // traction: slow is better than fast, heavy better than light
@@ -218,10 +212,6 @@ fn rougher_textures_have_less_traction() {
             })
             .collect();
         ours[m] = std::array::from_fn(|i| mean(worlds.iter().map(|w| w[i])));
-        println!(
-            "{force} N, {speed} mm/s: {:.2?}, paper {:.2?}",
-            ours[m], PAPER[m]
-        );
     }
     for (ours, paper) in ours.iter().zip(PAPER) {
         assert!((ours[0] - paper[0]).abs() < 0.2, "{ours:.2?}");

@@ -119,7 +119,7 @@ fn a_profile_has_the_heights_and_the_periods_of_its_texture() {
 #[test]
 fn friction_depends_on_speed_load_and_place() {
     let surface = sample(47, 1);
-    let texture = surface.texture();
+    let texture = &surface.texture;
     let at = |speed, load| surface.friction(30.0, speed, load);
     assert!((at(25.1, 1.26) / texture.friction - 1.0).abs() < 0.2);
     // a power of load; of speed one that bends about the speed at which it is quoted, and no more far beyond
@@ -161,7 +161,6 @@ fn the_mean_force_of_a_slide_is_that_of_the_press() {
         })
         .collect();
     errors.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-    println!("median {:.3}, worst {:.3?}", errors[29].0, &errors[54..]);
     assert!(errors[29].0.abs() < 0.01 && errors[55].0.abs() < 0.05);
 }
 
@@ -185,10 +184,6 @@ fn gratings_give_lines_at_v_over_lambda_and_its_harmonics() {
         for harmonic in 1..=3 {
             let on = line(&slide.pac, f64::from(harmonic) * hz);
             let beside = line(&slide.pac, (f64::from(harmonic) + 0.5) * hz);
-            println!(
-                "{speed} mm/s, {:.1} Hz: {on:.1} against {beside:.2} counts^2",
-                f64::from(harmonic) * hz
-            );
             assert!(on > 10.0 * beside, "{speed} mm/s, harmonic {harmonic}");
         }
     }

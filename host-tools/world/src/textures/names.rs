@@ -2,34 +2,20 @@
 
 /// Kinds of texture: the groups under the paper's Table 1.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Group {
-    /// Paper-like materials.
+pub(crate) enum Group {
     Paper,
-    /// Art supplies and miscellaneous materials.
     Art,
-    /// Types of glass.
     Glass,
-    /// Types of foam.
     Foam,
-    /// Tiles and laminates.
     Tile,
-    /// Types of wood.
     Wood,
-    /// Engineering materials.
     Engineering,
-    /// Types of rubber.
     Rubber,
-    /// Types of vinyl.
     Vinyl,
-    /// Leathers and suedes.
     Leather,
-    /// Cottons and silks.
     Cotton,
-    /// Other fabrics and textiles.
     Fabric,
-    /// Coarse weaves.
     Weave,
-    /// Furs.
     Fur,
 }
 
@@ -41,7 +27,7 @@ pub struct Named {
     /// Its name.
     pub name: &'static str,
     /// The group it belongs to.
-    pub group: Group,
+    pub(crate) group: Group,
 }
 
 const fn named(number: u8, name: &'static str, group: Group) -> Named {

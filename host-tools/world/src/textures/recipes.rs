@@ -8,7 +8,6 @@ use super::names::{Group, Named};
 /// Medians of a group or of a texture.
 #[derive(Clone, Copy)]
 pub(super) struct Recipe {
-    /// Coefficient of friction.
     pub(super) friction: f64,
     /// Height and wavelength of the finest asperities.
     pub(super) fine: (f64, f64),
@@ -22,15 +21,12 @@ pub(super) struct Recipe {
     pub(super) weave: (f64, f64),
     /// The weave is moulded, machined or extruded, and so exact.
     pub(super) grating: bool,
-    /// Relative fluctuation of friction.
     pub(super) friction_noise: f64,
     /// Deviation of ln(local amplitude).
     pub(super) heterogeneity: f64,
     /// Share of the vibrations swallowed.
     pub(super) damping: f64,
-    /// Thickness.
     pub(super) thickness_mm: f64,
-    /// Compliance.
     pub(super) compliance_mm_per_n: f64,
 }
 

@@ -30,15 +30,15 @@ impl World {
         self.scheduled.clear();
         self.peers.mend(self.now_ns);
         self.finger.mend();
-        self.stage.jam(false);
-        self.stage.decay_fast(false);
-        self.stage.vibrate(0.0);
+        self.stage.jammed = false;
+        self.stage.decays_fast = false;
+        self.stage.vibration_um = 0.0;
         let position_mm = self.stage.position_at_mm(self.fraction());
         self.encoder.set_cut(None, position_mm, self.now_ns);
         self.encoder.swap(false, position_mm, self.now_ns);
-        self.lever.lose_steps(0.0);
+        self.lever.lost_share = 0.0;
         self.lever.run_away_down(false);
-        self.lever.invert_dir(false);
+        self.lever.inverted = false;
         self.supply_motors();
     }
 }

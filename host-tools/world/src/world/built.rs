@@ -9,10 +9,10 @@ impl World {
     /// Builds a mistake into the rig. To be called before time passes; mistakes add up.
     pub fn miswire(&mut self, mistake: Miswired) {
         self.wires.take(mistake);
-        let position_mm = self.stage.position_mm();
+        let position_mm = self.stage.position_mm;
         match mistake {
-            Miswired::LeverCoilOpen => self.lever.open_coil(),
-            Miswired::LeverMicrosteps(per_pulse) => self.lever.set_microsteps(per_pulse),
+            Miswired::LeverCoilOpen => self.lever.coil_open = true,
+            Miswired::LeverMicrosteps(per_pulse) => self.lever.per_pulse = per_pulse,
             Miswired::EncoderLines(share) => self.encoder.set_lines(share, position_mm),
             _ => {}
         }
@@ -21,13 +21,13 @@ impl World {
     /// Levels at the chip's MISO and MOSI while the sensor is selected and has no clock; `None` if nothing drives them.
     pub fn data_lines(&self) -> [Option<bool>; 2] {
         let plugged = match &self.peers {
-            Peers::BioTac(sensor) => sensor.is_plugged(),
+            Peers::BioTac(sensor) => sensor.powered_ns.is_some(),
             _ => true,
         };
-        let selected = plugged && !self.wires.select_open;
+        let selected = plugged && !self.wires.have(Miswired::SelectOpen);
         // an idle sensor holds its output low (chosen)
         let sensor = selected.then_some(false);
-        match self.wires.data_exchanged {
+        match self.wires.have(Miswired::DataExchanged) {
             true => [self.faults.miso_stuck, sensor],
             false => [self.faults.miso_stuck.or(sensor), None],
         }
@@ -46,7 +46,7 @@ impl World {
 
     /// Puts a resistor of so many ohm in the place of the stage's motor, or the motor back.
     pub fn replace_motor(&mut self, ohm: Option<f64>) {
-        self.stage.replace_motor(ohm);
+        self.stage.resistor = ohm;
     }
 
     /// Turns the emergency stop back.
@@ -57,15 +57,15 @@ impl World {
 
     /// Returns true if the motors' drivers have their supply.
     pub fn has_motor_supply(&self) -> bool {
-        !self.faults.e_stop.cuts_power() || self.wires.stop_keeps_supply
+        !self.faults.e_stop.cuts_power() || self.wires.have(Miswired::EStopKeepsSupply)
     }
 
     /// Holds a limit switch of the stage, or the lever's, actuated with a finger, or lets it go.
     pub fn hold_switch(&mut self, switch: Reached, held: bool) {
         match switch {
-            Reached::Lower => self.stage.hold_limits(held, false),
-            Reached::Upper => self.stage.hold_limits(false, held),
-            Reached::Top => self.lever.hold_switch(held),
+            Reached::Lower => self.stage.held = (held, false),
+            Reached::Upper => self.stage.held = (false, held),
+            Reached::Top => self.lever.held = held,
         }
     }
 }

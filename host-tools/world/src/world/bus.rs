@@ -45,11 +45,6 @@ impl World {
         self.peers.complaints()
     }
 
-    /// The chip select of the finger's first part falls, in mode 0.
-    pub fn spi_select(&mut self, now_ns: u64) {
-        self.spi_select_part(now_ns, 0, ClockMode::of(0));
-    }
-
     /// The chip select of a part falls, with the bus in this mode.
     pub fn spi_select_part(&mut self, now_ns: u64, part: u8, mode: ClockMode) {
         self.advance_to(now_ns);

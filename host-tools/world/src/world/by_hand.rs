@@ -30,7 +30,7 @@ impl World {
     /// BioTac's fluid hardly feels it.
     pub fn shake(&mut self, g: f64, hz: f64) {
         self.table = (g, hz);
-        self.finger.hold(Held::STILL);
+        self.finger.held = Held::STILL;
     }
 
     /// Has a hand hold the finger from now on, in place of lever and stage, which move without it.
@@ -40,7 +40,7 @@ impl World {
 
     /// The finger is on the lever again, wherever that is.
     pub fn put_back(&mut self) {
-        self.finger.hold(Held::STILL);
+        self.finger.held = Held::STILL;
         self.holder = None;
     }
 
@@ -92,14 +92,6 @@ impl World {
     /// Counts of the slides and samples played, and of the samples that were cut.
     pub fn played(&self) -> PlayCounts {
         self.finger.played()
-    }
-
-    /// Gives the finger a new skin.
-    ///
-    /// # Errors
-    /// If the finger touches the sample.
-    pub fn replace_skin(&mut self) -> Result<(), NotLifted> {
-        self.put_on_skin(0.0)
     }
 
     /// Gives the finger a skin that is worn: 0 is new, at 1 its ridges are gone.

@@ -25,27 +25,12 @@ impl Holder {
         }
     }
 
-    /// Depth of the sample in the fingertip, mm; negative is a gap.
-    pub(super) fn indentation_mm(&self) -> f64 {
+    /// Depth of the sample in the fingertip, mm, negative for a gap; place of the finger on the sample, mm from its
+    /// edge; its speed along the sample, mm/s.
+    pub(super) fn place(&self) -> [f64; 3] {
         match self {
-            Self::Hand(hand) => hand.indentation_mm(),
-            Self::Arm(arm) => arm.indentation_mm(),
-        }
-    }
-
-    /// Place of the finger on the sample, mm from its edge.
-    pub(super) fn x_mm(&self) -> f64 {
-        match self {
-            Self::Hand(hand) => hand.x_mm(),
-            Self::Arm(arm) => arm.x_mm(),
-        }
-    }
-
-    /// Its speed along the sample, mm/s.
-    pub(super) fn speed_mm_s(&self) -> f64 {
-        match self {
-            Self::Hand(hand) => hand.speed_mm_s(),
-            Self::Arm(arm) => arm.speed_mm_s(),
+            Self::Hand(hand) => [hand.indentation_mm, hand.x_mm(), hand.speed_mm_s],
+            Self::Arm(arm) => [arm.indentation_mm(), arm.x_mm(), arm.speed_mm_s()],
         }
     }
 }

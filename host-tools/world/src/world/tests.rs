@@ -44,7 +44,6 @@ impl Bench {
         bench
     }
 
-    /// With the finger pressed.
     fn pressed(setup: Setup, force_n: f64) -> Self {
         let mut bench = Self::lowered(setup);
         while bench.world.truth().force_n < force_n {
@@ -248,40 +247,6 @@ fn the_stage_slides_and_its_pins_say_where() {
     assert_eq!(bench.world.truth().stage_mm, 0.0);
 }
 
-#[test]
-fn encoder_edges_are_the_count() {
-    let mut bench = Bench::new(Setup {
-        keep_edges: true,
-        ..setup(1, 5)
-    });
-    let (mut count, mut lines, mut last_ns) = (0, (false, false), 0);
-    for duty in [0.2, -0.1, 0.0] {
-        bench.world.stage_pwm(bench.now_ns, duty);
-        for _ in 0..200 {
-            bench.wait_ms(1);
-            while let Some(edge) = bench.world.next_encoder_edge() {
-                let up = match (lines, (edge.a, edge.b)) {
-                    ((false, false), (true, false))
-                    | ((true, false), (true, true))
-                    | ((true, true), (false, true))
-                    | ((false, true), (false, false)) => 1,
-                    ((true, false), (false, false))
-                    | ((true, true), (true, false))
-                    | ((false, true), (true, true))
-                    | ((false, false), (false, true)) => -1,
-                    both => panic!("not a Gray code: {both:?}"),
-                };
-                count += up;
-                lines = (edge.a, edge.b);
-                assert!(edge.at_ns >= last_ns && edge.at_ns <= bench.now_ns);
-                last_ns = edge.at_ns;
-            }
-            assert_eq!(count, bench.world.encoder());
-        }
-    }
-    assert!(count.abs() > 1_000);
-}
-
 /// At 1 kHz the count has to tell a constant speed, though ticks are not a whole part of a millisecond.
 #[test]
 fn the_count_is_smooth_between_ticks() {
@@ -306,14 +271,19 @@ fn the_count_is_smooth_between_ticks() {
 fn samples_and_skins_are_changed_with_the_finger_lifted() {
     let mut bench = Bench::pressed(setup(46, 1), 0.3);
     assert!(bench.world.place(47).is_err());
-    assert!(bench.world.replace_skin().is_err());
+    assert!(bench.world.put_on_skin(0.0).is_err());
     assert_eq!(bench.world.truth().texture, 46);
     bench.turn_to(false);
     bench.steps(1_000, 1_600);
-    bench.world.replace_skin().unwrap();
+    bench.world.put_on_skin(0.0).unwrap();
     let [thick, thin] = [true, false].map(|thick| {
         let over = bench.world.truth().tip_mm - 0.1;
-        let fits = |number: &u8| sample(*number, 1, crate::TRIAL_VARIATION).thickness_mm() < over;
+        let fits = |number: &u8| {
+            sample(*number, 1, crate::TRIAL_VARIATION)
+                .texture
+                .thickness_mm
+                < over
+        };
         (1..=117).find(|number| fits(number) != thick).unwrap()
     });
     assert!(

@@ -10,9 +10,7 @@ use clap::Parser;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain;
 
-/// The binaries of tests/fuzz.
-const TARGETS: [&str; 5] = ["wire", "table", "store", "recordings", "scenario"];
-/// Longest input, bytes.
+const TARGETS: [&str; 4] = ["wire", "table", "store", "recordings"];
 const MAX_LEN: usize = 8192;
 
 /// Attacks the parsers.
@@ -25,15 +23,12 @@ struct Options {
     /// Seconds for each target
     #[arg(long, default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..))]
     seconds: u64,
-    /// Plant a bug in every target, which must be found
-    #[arg(long)]
-    planted: bool,
 }
 
-/// Attacks the targets; an error if one breaks, or if a planted bug is not found.
+/// Attacks the targets; an error if one breaks.
 pub(super) fn fuzz(options: &[OsString]) -> Result<String> {
     let options = Options::parse_from([&["fuzz".into()], options].concat());
-    let programs = build(options.planted)?;
+    let programs = build()?;
     let names = match &options.targets[..] {
         [] => TARGETS.map(String::from).into(),
         some => some.to_vec(),
@@ -46,24 +41,15 @@ pub(super) fn fuzz(options: &[OsString]) -> Result<String> {
         let (line, broken) = one?;
         println!("{line}");
         match broken {
-            Some(why) if !options.planted || !why.contains("planted") => {
-                wrong.push(format!("{line}: {why}"))
-            }
-            None if options.planted => wrong.push(format!("{line}: the planted bug was not found")),
-            _ => lines.push(line),
+            Some(why) => wrong.push(format!("{line}: {why}")),
+            None => lines.push(line),
         }
     }
     ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
-    let what = if options.planted {
-        "Planted bugs found"
-    } else {
-        "Nothing broke"
-    };
-    Ok(format!("{what}: {}.", lines.join(", ")))
+    Ok(format!("Nothing broke: {}.", lines.join(", ")))
 }
 
-/// Builds the targets; the folder of their programs.
-fn build(planted: bool) -> Result<PathBuf> {
+fn build() -> Result<PathBuf> {
     let runs = |program: &&str| Command::new(program).arg("--version").output().is_ok();
     ensure!(
         ["c++", "g++", "clang++"].iter().any(runs),
@@ -74,9 +60,6 @@ fn build(planted: bool) -> Result<PathBuf> {
     build.current_dir(root().join("tests/fuzz"));
     build.args(["build", "--release", "--locked", "--target", &host]);
     build.arg("--target-dir").arg(&folder);
-    if planted {
-        build.args(["--features", "planted"]);
-    }
     let coverage = [
         "level=4",
         "inline-8bit-counters",
@@ -94,24 +77,17 @@ fn build(planted: bool) -> Result<PathBuf> {
     Ok(folder.join(host).join("release"))
 }
 
-/// Attacks a target: a line about it, and what broke it.
 fn attack(programs: &Path, name: &str, options: &Options) -> Result<(String, Option<String>)> {
     let folder = target().join("fuzz");
     let seeds = folder.join("seeds").join(name);
     run(Command::new(programs.join(name)).env("TACTUS_SEEDS", &seeds))?;
-    let corpus = folder
-        .join(if options.planted { "planted" } else { "corpus" })
-        .join(name);
-    if options.planted {
-        // a planted bug is found from the seeds alone
-        let _ = std::fs::remove_dir_all(&corpus);
-    }
+    let corpus = folder.join("corpus").join(name);
     std::fs::create_dir_all(&corpus)?;
     let mut fuzzer = Command::new(programs.join(name));
     fuzzer.arg(&corpus).arg(&seeds);
     // inputs that broke it once
     let kept = root().join("tests/fuzz/corpus").join(name);
-    if kept.is_dir() && !options.planted {
+    if kept.is_dir() {
         fuzzer.arg(kept);
     }
     let broken = folder.join(format!("{name}-"));

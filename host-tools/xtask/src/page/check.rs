@@ -17,7 +17,6 @@ const NOT_AS_IT_SHOULD_BE: &str = "the page is not as it should be";
 /// Longest that the probe in software takes: it may be compiled first.
 const STARTING: Duration = Duration::from_secs(600);
 /// Those that come with the command.
-const RECORDINGS: &str = "host-tools/recordings/simulated";
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 /// Builds the page and tries it; skipped where there is no toolchain for it, no Chromium or no Node.js. The screenshots
@@ -36,25 +35,18 @@ pub(crate) fn check() -> Result<()> {
     if let Err(why) = toolchain::get(BROWSER) {
         return skip(WHAT, &format!("{why:#}"));
     }
-    let built = build()?;
+    let built = build("tested")?;
     println!("== {} bytes of WebAssembly", built.wasm_bytes);
-    // requests with their replies here, a line each; and files for the page, as the command writes them
+    // requests with their replies here, a line each
     let native = left_by(
         "core_and_lab",
         "page::replies",
         "TACTUS_PAGE_REPLIES",
         "page-native.jsonl",
     )?;
-    let files = left_by(
-        "command",
-        "opened::leaves_files_for_a_page",
-        "TACTUS_PAGE_FILES",
-        "page-files",
-    )?;
     let probe = Probe::in_software()?;
-    let recordings = root().join(RECORDINGS);
     let (page, wasm) = (&built.page, &built.wasm);
-    let arguments = [page, wasm, &native, &files, &recordings].map(|path| path.as_os_str());
+    let arguments = [page, wasm, &native].map(|path| path.as_os_str());
     let mut tests = in_browser(browser, &arguments, &probe.address);
     run(&mut tests).context(NOT_AS_IT_SHOULD_BE)
 }
@@ -62,10 +54,10 @@ pub(crate) fn check() -> Result<()> {
 /// Tries what the page does with a probe, with the emulated board in place of the one in software.
 pub(crate) fn emulated() -> Result<()> {
     let browser = browser()?;
-    let built = build()?;
+    let built = build("release")?;
     let probe = Probe::emulated()?;
     let (page, wasm) = (&built.page, &built.wasm);
-    let arguments = [page, wasm, page, page, page].map(|path| path.as_os_str());
+    let arguments = [page, wasm, page].map(|path| path.as_os_str());
     let mut tests = in_browser(browser, &arguments, &probe.address);
     // one second of the board takes longer than a second
     tests.env("TACTUS_PAGE_SLOW", "10");

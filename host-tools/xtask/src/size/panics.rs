@@ -1,48 +1,17 @@
-//! The biggest symbols of an image, and the calls of functions that panic, by their places in the source.
+//! The calls of functions that panic in an image, by their places in the source.
 use std::collections::BTreeSet;
 
 use anyhow::Result;
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 
-/// How many symbols are the biggest.
-const SYMBOLS: usize = 10;
-/// A function, constant or variable, and its bytes.
-#[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Symbol {
-    pub(super) bytes: u64,
-    pub(super) name: String,
-}
-
-/// The biggest symbols.
-pub(super) fn symbols(elf: &[u8]) -> Result<Vec<Symbol>> {
-    let file = object::File::parse(elf)?;
-    let sized = file.symbols().filter(|symbol| {
-        matches!(symbol.kind(), SymbolKind::Text | SymbolKind::Data) && symbol.is_definition()
-    });
-    let mut symbols = sized
-        .map(|symbol| {
-            Ok(Symbol {
-                bytes: symbol.size(),
-                name: format!("{:#}", rustc_demangle::demangle(symbol.name()?)),
-            })
-        })
-        .collect::<Result<Vec<_>>>()?;
-    symbols.sort_by(|a, b| b.cmp(a));
-    symbols.dedup();
-    symbols.truncate(SYMBOLS);
-    Ok(symbols)
-}
-
 /// What a call of a function that panics comes from.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Kind {
-    /// A check in a dependency.
     Dependency,
     /// The body of an async function, which panics when it is polled after its end: no executor does that.
     Resumed,
     /// Several checks of one function that the compiler has made one: it does not say which.
     Merged,
-    /// A check in the core or in the firmware.
     Ours,
 }
 
@@ -84,7 +53,6 @@ struct Frame {
     line: u32,
 }
 
-/// A call of a function that panics.
 #[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Panic {
     pub(super) kind: Kind,
@@ -158,7 +126,6 @@ pub(super) fn panics(elf: &[u8]) -> Result<Vec<Panic>> {
 
 type Reader<'e> = addr2line::gimli::EndianSlice<'e, addr2line::gimli::LittleEndian>;
 
-/// The debug information of an image.
 struct Lines<'e>(addr2line::Context<Reader<'e>>);
 
 impl<'e> Lines<'e> {

@@ -55,7 +55,7 @@ fn words(parts: &[Part]) -> List<Option<Pressure>> {
             };
             words.push(Some(Pressure {
                 channel,
-                counts: Counts::saturating(value as f32),
+                counts: Counts::from_low_bits(value.round().clamp(0.0, 4095.0) as u16),
             }));
         }
     }

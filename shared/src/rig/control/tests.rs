@@ -1,6 +1,5 @@
 use super::*;
-use crate::sensor::PressureSensor as _;
-use crate::sensor::biotac::BioTac;
+use crate::sensor::biotac;
 use crate::sensor::pressure::Calibration;
 
 #[test]
@@ -15,7 +14,7 @@ fn a_lever_that_cannot_press_is_a_fault_and_lifts() {
         serial: [0; 16],
     };
     let mut control = Control::new(
-        &BioTac::MODEL,
+        &biotac::PARTS.model,
         StageConstants::REFERENCE,
         calibration,
         Unguarded::against(Fault::SensorSilent),

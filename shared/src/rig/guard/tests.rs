@@ -1,7 +1,6 @@
 use super::super::fault::FAULTS;
 use super::*;
-use crate::sensor::PressureSensor as _;
-use crate::sensor::biotac::BioTac;
+use crate::sensor::biotac;
 use crate::sensor::pressure::{Channel, Counts};
 
 fn word(channel: Channel, counts: u16) -> Option<Pressure> {
@@ -51,7 +50,7 @@ fn run(
                     ..inputs
                 },
                 &meter,
-                &BioTac::MODEL,
+                &biotac::PARTS.model,
                 11.5,
                 2050.0,
             )?,
@@ -173,7 +172,7 @@ fn no_calibration_allows_more_than_the_papers() {
                 ..inputs
             },
             &meter,
-            &BioTac::MODEL,
+            &biotac::PARTS.model,
             mn_per_count,
             2050.0,
         );
@@ -185,7 +184,7 @@ fn no_calibration_allows_more_than_the_papers() {
             force_mn_per_count: 5.75,
             ..Calibration::PAPER
         },
-        ..BioTac::MODEL
+        ..biotac::PARTS.model
     };
     let trips = |counts: u16, mn_per_count: f32| {
         let mut meter = ForceMeter::new(2000.0);
@@ -207,7 +206,7 @@ fn no_calibration_allows_more_than_the_papers() {
                 ..inputs
             },
             &ForceMeter::new(2000.0),
-            &BioTac::MODEL,
+            &biotac::PARTS.model,
             11.5,
             2050.0
         ),
@@ -235,14 +234,14 @@ fn the_table_has_every_fault_once_and_a_fault_can_be_ignored() {
     };
     let meter = ForceMeter::new(2593.0);
     assert_eq!(
-        guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0),
+        guard.tick(&inputs, &meter, &biotac::PARTS.model, 11.5, 2050.0),
         None
     );
     guard.reset();
-    guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0);
-    guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0);
+    guard.tick(&inputs, &meter, &biotac::PARTS.model, 11.5, 2050.0);
+    guard.tick(&inputs, &meter, &biotac::PARTS.model, 11.5, 2050.0);
     assert_eq!(
-        guard.tick(&inputs, &meter, &BioTac::MODEL, 11.5, 2050.0),
+        guard.tick(&inputs, &meter, &biotac::PARTS.model, 11.5, 2050.0),
         Some(Fault::LeverLimit),
         "the others are still looked for"
     );
@@ -275,11 +274,12 @@ fn a_high_force_is_allowed_and_guarded_by_limits_of_its_own() {
         (1995, 11.0, [false, true]),
     ] {
         let finger = finger(mn_per_count, 2000.0);
-        let may = [false, true].map(|high| may_press(&BioTac::MODEL, &finger, force_mn, high));
+        let may =
+            [false, true].map(|high| may_press(&biotac::PARTS.model, &finger, force_mn, high));
         assert_eq!(may, [usual, allowed], "{force_mn} mN, {mn_per_count}");
     }
     assert!(
-        !may_press(&BioTac::MODEL, &finger(11.5, 1200.0), 1262, true),
+        !may_press(&biotac::PARTS.model, &finger(11.5, 1200.0), 1262, true),
         "beyond its line"
     );
 }

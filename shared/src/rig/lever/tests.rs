@@ -1,6 +1,5 @@
 use super::*;
-use crate::sensor::PressureSensor as _;
-use crate::sensor::biotac::BioTac;
+use crate::sensor::biotac;
 
 /// P_DC of a finger in the air, counts.
 const REST: f32 = 2640.0;
@@ -24,7 +23,7 @@ struct Bench {
 
 impl Bench {
     fn new(clear_mm: f32, compliance: f32) -> Self {
-        let mut lever = Lever::new(&BioTac::MODEL, Unguarded::default());
+        let mut lever = Lever::new(&biotac::PARTS.model, Unguarded::default());
         lever.home();
         Self {
             lever,

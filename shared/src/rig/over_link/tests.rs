@@ -1,8 +1,7 @@
 use std::vec::Vec as List;
 
 use super::*;
-use crate::sensor::PressureSensor as _;
-use crate::sensor::biotac::BioTac;
+use crate::sensor::biotac;
 use crate::sensor::pressure::{Counts, Pressure};
 
 const AIR: f32 = 2000.0;
@@ -18,7 +17,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let pressure = BioTac::MODEL.calibration;
+        let pressure = biotac::PARTS.model.calibration;
         let calibration = RigCalibration {
             pressure,
             unloaded_a: (0.0, 0.0),
@@ -29,7 +28,7 @@ impl Bench {
             serial: [0; 16],
         };
         Self {
-            rig: RigOverLink::new(&BioTac::MODEL, calibration, Unguarded::default()),
+            rig: RigOverLink::new(&biotac::PARTS.model, calibration, Unguarded::default()),
             counts: 0.0,
             ms: 0,
             sent: List::new(),

@@ -1,6 +1,5 @@
 use super::*;
-use crate::sensor::PressureSensor as _;
-use crate::sensor::biotac::BioTac;
+use crate::sensor::biotac;
 use core::f32::consts::TAU;
 use std::vec::Vec;
 
@@ -54,7 +53,7 @@ impl Press {
     fn run(&self, target: f32, seed: u32) -> (Option<Fault>, f32) {
         let mut seed = seed.wrapping_mul(2_654_435_761);
         let calibration = Calibration::PAPER;
-        let mut progress = Progress::new(&BioTac::MODEL, Unguarded::default());
+        let mut progress = Progress::new(&biotac::PARTS.model, Unguarded::default());
         progress.lifted();
         let phase = TAU * noise(&mut seed);
         let hum = |sample: u32, seed: &mut u32| {
@@ -220,7 +219,10 @@ fn what_is_not_looked_for_is_not_found() {
         ..SOUND
     };
     assert_eq!(dead.run(100.0, 1).0, Some(Fault::PressureDead));
-    let mut progress = Progress::new(&BioTac::MODEL, Unguarded::against(Fault::PressureDead));
+    let mut progress = Progress::new(
+        &biotac::PARTS.model,
+        Unguarded::against(Fault::PressureDead),
+    );
     progress.lately = 9.0;
     for steps in 0..5000 {
         progress.of_piece = 9.0;
@@ -240,7 +242,7 @@ fn what_is_not_looked_for_is_not_found() {
 /// A knock against the bench does not count after its end: P_AC swings back.
 #[test]
 fn a_knock_is_no_contact() {
-    let mut progress = Progress::new(&BioTac::MODEL, Unguarded::default());
+    let mut progress = Progress::new(&biotac::PARTS.model, Unguarded::default());
     progress.lifted();
     (0..440).for_each(|_| progress.rest(2043));
     let mut slow = 0.0;

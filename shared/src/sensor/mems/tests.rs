@@ -24,7 +24,7 @@ fn run(
     let mut counts = [Vec::new(), Vec::new()];
     for n in 0..slots {
         let z = z(n as f32 / 4400.0).round() as i16;
-        let sample = finger.decode(n, &answer(n, z, cell(n)));
+        let sample = finger.sample(n, &answer(n, z, cell(n)));
         if n >= 100 {
             let sample = sample.unwrap();
             counts[sample.channel as usize].push(f32::from(sample.counts.get()));
@@ -89,12 +89,12 @@ fn a_cell_that_stops_is_noticed_after_five_reads() {
     let mut lost = None;
     for n in 0..4000 {
         let cell = noisy(n.min(2000) / 4 * 4);
-        let sample = finger.decode(n, &answer(n, 0, cell));
+        let sample = finger.sample(n, &answer(n, 0, cell));
         if n % 2 == 1 && n > 100 {
             match sample {
                 Ok(_) => assert_eq!(lost, None, "it does not come back"),
                 Err(why) => {
-                    assert_eq!(why, MemsError::Stale);
+                    assert_eq!(why, FingerError::Stale);
                     lost.get_or_insert(n);
                 }
             }
@@ -118,24 +118,27 @@ fn what_is_read_twice_is_no_fault() {
 fn a_brown_out_and_an_open_wire_are_named() {
     let mut finger = Mems::new();
     for n in 0..40 {
-        let _ = finger.decode(n, &answer(n, 0, noisy(n)));
+        let _ = finger.sample(n, &answer(n, 0, noisy(n)));
     }
-    assert!(finger.decode(40, &answer(40, 0, 1)).is_ok());
+    assert!(finger.sample(40, &answer(40, 0, 1)).is_ok());
     for n in 41..43 {
-        let _ = finger.decode(n, &answer(n, 0, 5));
+        let _ = finger.sample(n, &answer(n, 0, 5));
     }
     let mut off = answer(43, 0, 0);
     *off.last_mut().unwrap() = 0x00;
-    assert!(finger.decode(43, &off).is_ok(), "P_DC is heard still");
-    assert_eq!(finger.decode(44, &answer(44, 0, 0)), Err(MemsError::Off));
+    assert!(finger.sample(43, &off).is_ok(), "P_DC is heard still");
+    assert_eq!(finger.sample(44, &answer(44, 0, 0)), Err(FingerError::Off));
     for end in [0x7F_FFFF, -0x80_0000] {
-        assert_eq!(finger.decode(45, &answer(45, 0, end)), Err(MemsError::Cell));
+        assert_eq!(
+            finger.sample(45, &answer(45, 0, end)),
+            Err(FingerError::Cell)
+        );
     }
-    assert_eq!(finger.decode(46, &[0, 0]), Err(MemsError::Silent));
+    assert_eq!(finger.sample(46, &[0, 0]), Err(FingerError::Silent));
     // nobody on the line
-    assert_eq!(finger.decode(49, &[0xFF; 6]), Err(MemsError::Silent));
-    assert_eq!(finger.decode(51, &[0xFF; 4]), Err(MemsError::Begins));
-    assert_eq!(finger.decode(52, &[0xFF; 3]), Err(MemsError::Off));
+    assert_eq!(finger.sample(49, &[0xFF; 6]), Err(FingerError::Silent));
+    assert_eq!(finger.sample(51, &[0xFF; 4]), Err(FingerError::Begins));
+    assert_eq!(finger.sample(52, &[0xFF; 3]), Err(FingerError::Off));
 }
 
 #[test]
@@ -154,10 +157,10 @@ fn an_acceleration_beyond_the_range_is_clipped() {
 
 #[test]
 fn it_begins_with_nothing() {
-    let mut finger = Mems::default();
-    assert_eq!(finger.decode(0, &answer(0, 0, 0)), Err(MemsError::Begins));
+    let mut finger = Mems::new();
+    assert_eq!(finger.sample(0, &answer(0, 0, 0)), Err(FingerError::Begins));
     assert_eq!(
-        Mems::new().decode(3, &answer(3, 0, 0)),
-        Err(MemsError::Begins)
+        Mems::new().sample(3, &answer(3, 0, 0)),
+        Err(FingerError::Begins)
     );
 }

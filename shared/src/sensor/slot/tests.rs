@@ -6,25 +6,22 @@ use std::vec::Vec;
 use embedded_hal::spi::{MODE_0, MODE_1, MODE_3};
 
 use super::*;
-use crate::sensor::analog::Analog;
-use crate::sensor::biotac::BioTac;
-use crate::sensor::mems::Mems;
 use crate::sensor::pressure::{Channel, SLOTS_HZ};
-use crate::sensor::{PressureSensor, ads1220, iis3dwb, slot_of};
+use crate::sensor::{AnyFinger, FingerName, FingerParts, ads1220, biotac, iis3dwb, mems};
 
 /// A transaction on the wire: select, mode, bytes, and the pause behind them, us.
 type Seen = (u8, Mode, Vec<u8>, u32);
 
 /// Slots `0..slots` of a finger, whose parts answer with `says`: what went over the wire, and the counts.
-fn run<S: PressureSensor>(
-    sensor: &mut S,
+fn run(
+    name: FingerName,
     slots: u32,
     mut says: impl FnMut(u8, &[u8]) -> Vec<u8>,
 ) -> (Vec<Seen>, Vec<Option<u16>>) {
-    let mut wire = Vec::new();
+    let (mut sensor, mut wire) = (AnyFinger::new(name), Vec::new());
     let counts = (0..slots).map(|n| {
-        let answer = perform(slot_of::<S>(n), |transaction, bytes| {
-            let port = &S::PORTS[usize::from(transaction.port)];
+        let answer = perform(name.parts().slot(n), |transaction, bytes| {
+            let port = &name.parts().ports[usize::from(transaction.port)];
             let (mode, gap_us) = (port.mode, transaction.gap_us);
             wire.push((transaction.port, mode, bytes.to_vec(), gap_us));
             let came_in = says(transaction.port, bytes);
@@ -41,7 +38,7 @@ fn run<S: PressureSensor>(
 
 #[test]
 fn a_biotac_is_asked_and_read_after_its_gap() {
-    let (wire, counts) = run(&mut BioTac, 3, |_, mosi| match mosi[0] {
+    let (wire, counts) = run(FingerName::Biotac, 3, |_, mosi| match mosi[0] {
         // what comes in during a command is no answer
         0x80.. => vec![0x01, 0x01],
         _ => vec![0xA2, 0x08],
@@ -64,7 +61,7 @@ fn a_biotac_is_asked_and_read_after_its_gap() {
 
 #[test]
 fn a_converter_answers_while_it_is_asked() {
-    let (wire, counts) = run(&mut Analog, 2, |_, mosi| match mosi[1] {
+    let (wire, counts) = run(FingerName::Analog, 2, |_, mosi| match mosi[1] {
         0xA0 => vec![0xFF, 0xE7, 0xE5],
         _ => vec![0x00, 0x0A, 0x8F],
     });
@@ -76,7 +73,7 @@ fn a_converter_answers_while_it_is_asked() {
 #[test]
 fn a_finger_of_two_parts_has_two_selects_and_two_modes() {
     let mut conversions = 0;
-    let (wire, counts) = run(&mut Mems::new(), 24, |port, mosi| match (port, mosi[0]) {
+    let (wire, counts) = run(FingerName::Mems, 24, |port, mosi| match (port, mosi[0]) {
         (0, 0xAC) => vec![0xFF, 0x20, 0x03, 0xFF],
         (0, _) => vec![0xFF, 0xA2],
         _ => {
@@ -103,18 +100,20 @@ fn a_finger_of_two_parts_has_two_selects_and_two_modes() {
 }
 
 /// The answers of a part to each step of a start-up list.
-fn start<S: PressureSensor>(
+fn start(
+    name: FingerName,
     mut says: impl FnMut(usize, &[u8]) -> Vec<u8>,
 ) -> Result<(), Unexpected> {
-    S::START.iter().enumerate().try_for_each(|(at, step)| {
-        assert!(usize::from(step.transaction.port) < S::PORTS.len());
+    let FingerParts { start, ports, .. } = name.parts();
+    start.iter().enumerate().try_for_each(|(at, step)| {
+        assert!(usize::from(step.transaction.port) < ports.len());
         assert!(usize::from(step.transaction.answer) >= step.expect.len());
         let answer = perform(&[step.transaction], |_, bytes| {
             let came_in = says(at, bytes);
             bytes.copy_from_slice(&came_in);
             Ok::<(), ()>(())
         });
-        step.check(S::PORTS, &answer.unwrap())
+        step.check(ports, &answer.unwrap())
     })
 }
 
@@ -139,14 +138,14 @@ fn a_start_up_list_names_the_part_that_does_not_answer() {
             _ => vec![0xFF; mosi.len()],
         }
     };
-    assert_eq!(start::<Mems>(&mut good), Ok(()));
-    let why = start::<Mems>(|_, mosi| vec![0xFF; mosi.len()]).unwrap_err();
+    assert_eq!(start(FingerName::Mems, &mut good), Ok(()));
+    let why = start(FingerName::Mems, |_, mosi| vec![0xFF; mosi.len()]).unwrap_err();
     assert_eq!(
         (why.part, why.sent, why.got, why.want),
         ("IIS3DWB accelerometer", 0x8F, 0xFF, 0x7B)
     );
     let cell_at = iis3dwb::START.len();
-    let why = start::<Mems>(|at, mosi| {
+    let why = start(FingerName::Mems, |at, mosi| {
         let mut came_in = good(at, mosi);
         if at > cell_at {
             came_in.fill(0);
@@ -156,38 +155,39 @@ fn a_start_up_list_names_the_part_that_does_not_answer() {
     let why = why.unwrap_err();
     assert_eq!((why.part, why.want), (ads1220::PORT.name, 0x0E));
     assert!(std::format!("{why}").contains("SPI mode"));
-    assert_eq!(start::<BioTac>(|_, _| vec![]), Ok(()));
-    assert_eq!(start::<Analog>(|_, _| vec![]), Ok(()));
+    assert_eq!(start(FingerName::Biotac, |_, _| vec![]), Ok(()));
+    assert_eq!(start(FingerName::Analog, |_, _| vec![]), Ok(()));
 }
 
 /// At the clocks that a chip may have, and with 7 us of lateness of each transaction.
 #[test]
 fn all_slots_are_over_before_the_next_one() {
-    fn longest<S: PressureSensor>(clock_hz: u32) -> u32 {
-        for port in S::PORTS {
-            assert!(port.clock_hz.contains(&clock_hz));
-        }
-        let slots = S::SLOTS.iter();
-        let lengths = slots.map(|slot| {
-            assert!(slot.iter().all(|t| usize::from(t.port) < S::PORTS.len()));
+    let longest = |name: FingerName, clock_hz: u32| {
+        let FingerParts { ports, slots, .. } = name.parts();
+        assert!(ports.iter().all(|port| port.clock_hz.contains(&clock_hz)));
+        let lengths = slots.iter().map(|slot| {
+            assert!(slot.iter().all(|t| usize::from(t.port) < ports.len()));
             assert!(slot.iter().all(|t| t.out.len() <= MAX_BYTES));
             length_us(slot, 8_000_000_000_u64.div_ceil(clock_hz.into()) as u32, 7)
         });
         lengths.max().unwrap()
-    }
+    };
     let slot_us = 1_000_000 / SLOTS_HZ;
-    assert_eq!(longest::<BioTac>(5_250_000), 4 + 7 + 50 + 4 + 7 + 10);
-    assert_eq!(longest::<Analog>(656_250), 37 + 7 + 1);
-    assert_eq!(longest::<Mems>(5_250_000), 7 + 7 + 1 + 7 + 7 + 1);
-    assert!(longest::<Mems>(656_250) < slot_us);
-    assert!(longest::<BioTac>(500_000) < slot_us);
+    assert_eq!(
+        longest(FingerName::Biotac, 5_250_000),
+        4 + 7 + 50 + 4 + 7 + 10
+    );
+    assert_eq!(longest(FingerName::Analog, 656_250), 37 + 7 + 1);
+    assert_eq!(longest(FingerName::Mems, 5_250_000), 7 + 7 + 1 + 7 + 7 + 1);
+    assert!(longest(FingerName::Mems, 656_250) < slot_us);
+    assert!(longest(FingerName::Biotac, 500_000) < slot_us);
 }
 
 #[test]
 fn a_bus_that_fails_ends_a_slot() {
     for fails_at in 0..2 {
         let mut done = 0;
-        let answer = perform(slot_of::<BioTac>(0), |_, _| {
+        let answer = perform(biotac::PARTS.slot(0), |_, _| {
             done += 1;
             if done > fails_at { Err("off") } else { Ok(()) }
         });
@@ -196,29 +196,14 @@ fn a_bus_that_fails_ends_a_slot() {
     }
 }
 
-/// Bytes of an answer are the last ones that came in, and go where [`Transaction::answers_at`] says.
-#[test]
-fn answers_are_the_last_bytes() {
-    let cell = ads1220::READ;
-    let expected: Vec<u8> = (0..cell.out.len())
-        .filter(|index| cell.answers_at(*index))
-        .map(|index| index as u8)
-        .collect();
-    let answer = perform(&[cell], |_, bytes| {
-        bytes
-            .iter_mut()
-            .zip(0..)
-            .for_each(|(to, index)| *to = index);
-        Ok::<(), ()>(())
-    });
-    assert_eq!(answer.unwrap()[..], expected);
-    assert_eq!(expected, [1, 2, 3]);
-}
-
 #[test]
 fn what_is_wrong_with_a_part_fits_into_a_sentence() {
-    for step in Mems::START.iter().filter(|step| !step.expect.is_empty()) {
-        let error = step.check(Mems::PORTS, &[]).unwrap_err();
+    for step in mems::PARTS
+        .start
+        .iter()
+        .filter(|step| !step.expect.is_empty())
+    {
+        let error = step.check(mems::PARTS.ports, &[]).unwrap_err();
         let said = std::string::ToString::to_string(&error);
         let named = std::format!(
             "the {} answers FF to {:02X} and not {:02X}: ",

@@ -1,4 +1,5 @@
-//! The power is cut at every word and in every erase of every operation: the state before it or the one after it is left.
+//! The power is cut at every word and in every erase of every operation: the state before it or the one after it is
+//! left.
 
 use super::ram::Torn;
 use super::*;
@@ -208,8 +209,8 @@ fn ways(seed: u32) -> [Torn; 8] {
     ]
 }
 
-/// Cuts `operation` at every word and in every erase, in every way; `before` is what `ram` holds. Returns the flash after
-/// the operation without a cut, and the number of cuts.
+/// Cuts `operation` at every word and in every erase, in every way; `before` is what `ram` holds. Returns the flash
+/// after the operation without a cut, and the number of cuts.
 fn cut_everywhere(ram: &Ram, before: &Model, operation: &Operation) -> (Ram, usize) {
     let after = before.after(operation);
     let mut whole = open(ram.clone().again());

@@ -1,5 +1,5 @@
-//! Bits of the flash that change by themselves: to ones and to zeros in what was written, to zeros where nothing was. Flash
-//! without ECC says nothing of it, and a word that is written afterwards keeps the zeros.
+//! Bits of the flash that change by themselves: to ones and to zeros in what was written, to zeros where nothing was.
+//! Flash without ECC says nothing of it, and a word that is written afterwards keeps the zeros.
 
 use super::cuts::Model;
 use super::ram::SECTOR;

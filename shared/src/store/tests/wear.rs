@@ -1,13 +1,14 @@
 //! How much an identification and a training wear the chip's own sectors: counted here, and stated in the book
 //! (docs/src/learning.md).
 //!
-//! The firmware stores the skin's care after every identification, and one self-learned record where it may learn and was
-//! certain (`probe/memory.rs`); every training and every label writes the table anew.
+//! The firmware stores the skin's care after every identification, and one self-learned record where it may learn and
+//! was certain (`probe/memory.rs`); every training and every label writes the table anew.
 
 use super::self_learned::{Chip, chip, learned_record};
 use super::*;
 
-/// Erases of a sector that the chip's data sheet guarantees: 10 000 cycles (DS9405, STM32F427/429, flash memory endurance).
+/// Erases of a sector that the chip's data sheet guarantees: 10 000 cycles (DS9405, STM32F427/429, flash memory
+/// endurance).
 const ENDURANCE: u32 = 10_000;
 const IDENTIFICATIONS: u32 = 2000;
 /// Textures of the paper's Table 1: all of them self-learned at both movements, in features of two bytes each.
@@ -92,7 +93,7 @@ fn a_training_erases_one_of_the_two_sectors_of_the_table() {
             store.begin_table(bytes.len()).await.unwrap();
             store.write_table(0, &bytes).await.unwrap();
             let mut buffer = [0; SECTOR];
-            store.commit_table(&mut buffer).await.unwrap();
+            store.commit_table(None, &mut buffer).await.unwrap();
         });
         assert_eq!(store.flash.erases - erases, 1);
         // the header's six words and the commit word

@@ -65,30 +65,30 @@ pub(super) fn read_all(bytes: &[u8]) {
 }
 
 #[test]
-fn every_flipped_bit_is_noticed() {
-    let good = small();
-    for at in 0..good.len() {
-        for bit in 0..8 {
+fn every_flipped_bit_and_every_truncation_is_noticed() {
+    for good in [small(), super::fused::small_fused()] {
+        let whole = good.len();
+        for at in 0..8 * whole {
             let mut bytes = good.clone();
-            bytes[at] ^= 1 << bit;
-            let named = match (at, error(&bytes)) {
+            bytes[at / 8] ^= 1 << (at % 8);
+            let named = match (at / 8, error(&bytes)) {
                 (0..4, why) => why == TableError::Magic(bytes[..4].try_into().unwrap()),
                 (4..6, why) => why == TableError::Version(u16::from_le_bytes([bytes[4], bytes[5]])),
-                (8..12, TableError::Truncated { got: 107, wanted }) => wanted > 107,
-                (
-                    8..12,
-                    TableError::Length {
-                        header,
-                        contents: HEADER,
-                    },
-                ) => header < CRC_BYTES,
-                (8..12, TableError::Crc { .. }) => bytes[8] < 107,
+                (8..12, TableError::Truncated { got, wanted }) => got == whole && wanted > whole,
+                (8..12, TableError::Length { header, contents }) => {
+                    header < CRC_BYTES && contents == HEADER
+                }
+                (8..12, TableError::Crc { .. }) => usize::from(bytes[8]) < whole,
                 (_, TableError::Crc { stored, computed }) => {
-                    stored == crc_of(&bytes) && computed == crc32(&bytes[..103])
+                    stored == crc_of(&bytes) && computed == crc32(&bytes[..whole - CRC_BYTES])
                 }
                 _ => false,
             };
-            assert!(named, "byte {at}, bit {bit}: {}", error(&bytes));
+            assert!(named, "bit {at}: {}", error(&bytes));
+        }
+        for got in 0..whole {
+            let wanted = if got < HEADER { HEADER } else { whole };
+            assert_eq!(error(&good[..got]), TableError::Truncated { got, wanted });
         }
     }
 }
@@ -98,21 +98,14 @@ pub(super) fn crc_of(bytes: &[u8]) -> u32 {
     u32::from_le_bytes(bytes[bytes.len() - 4..].try_into().unwrap())
 }
 
-#[test]
-fn every_truncation_is_noticed() {
-    let good = small();
-    for got in 0..good.len() {
-        let wanted = if got < HEADER { HEADER } else { good.len() };
-        assert_eq!(error(&good[..got]), TableError::Truncated { got, wanted });
-    }
-    assert!(Table::read(&good).is_ok());
+fn length(header: usize, contents: usize) -> TableError {
+    TableError::Length { header, contents }
 }
 
 #[test]
 fn every_check_names_what_is_wrong() {
     assert!(Table::read(&wrong(|_| ())).is_ok());
     let at = |at: usize, byte: u8| error(&wrong(|bytes| bytes[at] = byte));
-    let length = |header, contents| TableError::Length { header, contents };
     assert_eq!(at(3, b'Z'), TableError::Magic(*b"TACZ"));
     assert_eq!(at(5, 1), TableError::Version(257));
     assert_eq!(at(6, 2), TableError::Method(2));
@@ -205,101 +198,59 @@ fn every_check_names_what_is_wrong() {
 }
 
 #[test]
-fn every_error_says_what_is_wrong() {
+fn errors_count_from_one_and_say_what_was_found() {
     let action = act(1, Property::Fineness);
-    for (error, message) in [
-        (
-            TableError::Truncated { got: 5, wanted: 16 },
-            "truncated: 5 bytes of 16",
-        ),
-        (
-            TableError::Magic(*b"PK\x03\x04"),
-            "not a texture table: it begins with [50, 4b, 03, 04], not `TACT`",
-        ),
-        (
-            TableError::Version(2),
-            "version 2, and this program reads version 1: learn the table anew, or use the program that wrote it",
-        ),
-        (TableError::Method(7), "method 7 is unknown"),
-        (
-            TableError::Length {
-                header: 90,
-                contents: 93,
-            },
-            "the header says 90 bytes, the contents take 93",
-        ),
-        (
-            TableError::Crc {
-                stored: 0xab,
-                computed: 0x1234_5678,
-            },
-            "damaged: checksum 12345678, and 000000ab was written",
-        ),
-        (
-            TableError::Header,
-            "the header counts no textures, movements or properties, or too many",
-        ),
-        (
-            TableError::Movement(0, MovementError::Force(99)),
-            "movement 1: contact force 99 mN is outside",
-        ),
-        (TableError::TwinMovement(1), "movement 2 is there twice"),
-        (
-            TableError::Deviation { texture: 4, action },
-            "texture 5, movement 2, fineness: trials, but no standard deviation",
-        ),
-        (
-            TableError::Whitening(2),
-            "the whitening of movement 3 is damaged",
-        ),
-        (TableError::Number(3), "texture 4 has another's number"),
-        (TableError::Sections, "what follows the names is damaged"),
-        (
-            TableError::Section(1),
-            "the drift that it expects is damaged",
-        ),
-        (
-            TableError::Section(2),
-            "its limits of new and changed textures are damaged",
-        ),
-        (TableError::Section(4), "its slopes over speed are damaged"),
-        (TableError::Section(9), "section 9 is damaged"),
-        (
-            TableError::Name(0),
-            "the name of texture 1 is empty, not UTF-8, or another's as well",
-        ),
-    ] {
-        assert!(error.to_string().contains(message), "{error}");
-        assert_eq!(EncodeError::Invalid(error).to_string(), error.to_string());
-    }
-    for (error, message) in [
-        (
-            EncodeError::Contents,
-            "what was learned does not fit this kind of table",
-        ),
-        (EncodeError::Texture(2), "the table has no texture 3"),
-        (
-            EncodeError::Empty,
-            "a table needs a texture, a property and 1 to 36 movements",
-        ),
-        (EncodeError::NoSpace(93), "the table takes 93 bytes"),
-        (
-            EncodeError::Movements(0),
-            "texture 1 was not learned at every movement",
-        ),
-        (
-            EncodeError::Name(1),
-            "the name of texture 2 is longer than 255 bytes",
-        ),
-        (
-            EncodeError::Range {
-                texture: 2,
-                action,
-                mean: 8.5,
-            },
-            "texture 3, movement 2: fineness 8.5 is beyond the table's +-8",
-        ),
-    ] {
+    let (mean, texture) = (8.5, 2);
+    let invalid = [
+        TableError::Truncated { got: 5, wanted: 16 },
+        TableError::Magic(*b"PK\x03\x04"),
+        TableError::Version(2),
+        TableError::Method(7),
+        length(90, 93),
+        TableError::Crc {
+            stored: 0xab,
+            computed: 0x1234_5678,
+        },
+        TableError::Movement(0, MovementError::Force(99)),
+        TableError::TwinMovement(1),
+        TableError::Deviation { texture: 4, action },
+        TableError::Whitening(2),
+        TableError::Number(3),
+        TableError::Section(9),
+        TableError::Name(0),
+    ];
+    let others = [
+        EncodeError::Texture(2),
+        EncodeError::NoSpace(93),
+        EncodeError::Movements(0),
+        EncodeError::Name(1),
+        EncodeError::Range {
+            texture,
+            action,
+            mean,
+        },
+    ];
+    let invalid = invalid.map(EncodeError::Invalid);
+    for (error, message) in invalid.into_iter().chain(others).zip([
+        "truncated: 5 bytes of 16",
+        "not a texture table: it begins with [50, 4b, 03, 04], not `TACT`",
+        "version 2, and this program reads version 1: learn the table anew, or use the program that wrote it",
+        "method 7 is unknown",
+        "the header says 90 bytes, the contents take 93",
+        "damaged: checksum 12345678, and 000000ab was written",
+        "movement 1: contact force 99 mN is outside",
+        "movement 2 is there twice",
+        "texture 5, movement 2, fineness: trials, but no standard deviation",
+        "the whitening of movement 3 is damaged",
+        "texture 4 has another's number",
+        "section 9 is damaged",
+        "the name of texture 1 is empty, not UTF-8, or another's as well",
+        "the table has no texture 3",
+        "the table takes 93 bytes",
+        "texture 1 was not learned at every movement",
+        "the name of texture 2 is longer than 255 bytes",
+        "texture 3, movement 2: fineness 8.5 is beyond the table's +-8",
+    ]) {
         assert!(error.to_string().contains(message), "{error}");
     }
 }

@@ -1,14 +1,14 @@
 //! Fused tables against one written by hand; learning, renaming and deleting in tables of either kind.
 
-use super::damage::{crc_of, read_all};
+use super::damage::read_all;
 use super::*;
-use crate::table::tests::whitening::{Noise, World, by_hand, learned as whitenings};
+use crate::table::tests::whitening::{Noise, by_hand};
 
 const BANDS: FeatureSet = FeatureSet::Bands;
 
 /// Two textures, two movements and two features, field by field as the module's page has it: movements begin at byte
 /// 16, whitenings at 28, cells at 52, trials at 68, the lineage at 72, numbers and tallies at 76, names at 86.
-fn small_fused() -> Vec<u8> {
+pub(super) fn small_fused() -> Vec<u8> {
     let mut bytes = b"TACT\x01\0\x01\x02\x67\0\0\0\x02\0\x02\x02".to_vec();
     bytes.extend(b"\xee\x04\x10\x27\0\0"); // 1262 mN, 10000 um/s
     bytes.extend(b"\xc8\0\x78\xf6\0\0"); // 200 mN, 63096 um/s
@@ -130,32 +130,6 @@ fn the_fused_form_is_the_documented_one() {
     );
 }
 
-#[test]
-fn every_flipped_bit_of_a_fused_table_is_noticed() {
-    let good = small_fused();
-    for at in 0..good.len() {
-        for bit in 0..8 {
-            let mut bytes = good.clone();
-            bytes[at] ^= 1 << bit;
-            let named = match (at, error(&bytes)) {
-                (0..4, TableError::Magic(_)) | (4..6, TableError::Version(_)) => true,
-                (8..12, TableError::Truncated { got: 103, wanted }) => wanted > 103,
-                (8..12, TableError::Length { header, .. }) => header < CRC_BYTES,
-                (8..12, TableError::Crc { .. }) => bytes[8] < 103,
-                (_, TableError::Crc { stored, computed }) => {
-                    stored == crc_of(&bytes) && computed == crc32(&bytes[..99])
-                }
-                _ => false,
-            };
-            assert!(named, "byte {at}, bit {bit}: {}", error(&bytes));
-        }
-    }
-    for got in 0..good.len() {
-        let wanted = if got < HEADER { HEADER } else { good.len() };
-        assert_eq!(error(&good[..got]), TableError::Truncated { got, wanted });
-    }
-}
-
 proptest! {
     #![proptest_config(fixed(512))]
 
@@ -238,41 +212,6 @@ fn what_is_no_fused_table_is_not_written() {
     assert_eq!(none, Err(EncodeError::NoSpace(103)));
 }
 
-#[test]
-fn the_study_takes_11_kb_at_most() {
-    let contents = Contents::Fused(FeatureSet::Force, 13);
-    let noise = &mut Noise(1);
-    let world = World::new(noise, 117, 3, 13);
-    let slides = world.slides(noise, 5);
-    let whitenings = whitenings(&slides);
-    let known: Vec<Vec<Whitened>> = (0..117)
-        .map(|t| {
-            let of = |m: usize| {
-                let mut known = Whitened::default();
-                for slide in &slides[m][t] {
-                    known.teach(&whitenings[m].apply(slide));
-                }
-                known
-            };
-            (0..3).map(of).collect()
-        })
-        .collect();
-    let bytes = fused_of(FeatureSet::Force, &whitenings, &known);
-    let table = Table::read(&bytes).unwrap();
-    for (texture, row) in (0..).zip(&known) {
-        for (movement, known) in (0..).zip(row) {
-            assert_eq!(table.whitened(texture, movement), *known);
-        }
-    }
-    let names: usize = table.names().map(|name| name.len() + 1).sum();
-    assert_eq!(bytes.len() - names, encoded_len(contents, 117, 3, 0));
-    assert!(
-        bytes.len() - names <= 11 << 10,
-        "{} bytes",
-        bytes.len() - names
-    );
-}
-
 /// Everything that a table has of a texture but its place.
 fn whole(table: &Table<'_>, name: &str) -> (u16, Tally, Vec<Vec<u8>>, Vec<u8>) {
     let texture = table.find(name).unwrap();
@@ -335,9 +274,9 @@ fn a_change_leaves_all_others_as_they_are() {
         let gaussians = [learned(&[[0.25, 1.0, 1.5], [0.75, 2.0, 2.5]]); 3];
         let whitened = [1, 7, 200].map(|n| super::known(n, &[1.0, -2.0, 3.0, f64::from(n) / 8.0]));
         let known = if is_fused {
-            Known::Fused(&whitened)
+            TextureStats::Fused(&whitened)
         } else {
-            Known::Gaussians(&gaussians)
+            TextureStats::Gaussians(&gaussians)
         };
         let is_it = |table: &Table<'_>, name: &str| {
             let texture = table.find(name).unwrap();
@@ -425,17 +364,17 @@ fn a_change_that_cannot_be_is_refused() {
         assert_eq!(refused(rename(2, &long)), EncodeError::Name(2));
         let is_fused = matches!(table.contents(), Contents::Fused(..));
         let (mine, other, short) = if is_fused {
-            let short = Known::Fused(&whitened[..2]);
+            let short = TextureStats::Fused(&whitened[..2]);
             (
-                Known::Fused(&whitened),
-                Known::Gaussians(&experience),
+                TextureStats::Fused(&whitened),
+                TextureStats::Gaussians(&experience),
                 short,
             )
         } else {
-            let short = Known::Gaussians(&experience[..2]);
+            let short = TextureStats::Gaussians(&experience[..2]);
             (
-                Known::Gaussians(&experience),
-                Known::Fused(&whitened),
+                TextureStats::Gaussians(&experience),
+                TextureStats::Fused(&whitened),
                 short,
             )
         };

@@ -82,47 +82,33 @@ fn slopes_read_back_and_follow_their_textures() {
         Slope::default()
     );
 
-    let new = [known(3, &[9.0, 9.0]), known(3, &[9.0, 9.0])];
-    let put = |name| Change::Put {
-        name,
-        known: Known::Fused(&new),
-        tally: Tally::default(),
-    };
-    let names: Vec<String> = table.names().map(ToString::to_string).collect();
-    let mut out = vec![0; 4000];
-    let of = |table: &Table<'_>| -> Vec<Slope> {
+    let of = |bytes: &[u8]| -> Vec<Slope> {
+        let table = Table::read(bytes).unwrap();
         let textures = 0..table.textures();
         textures.map(|t| table.slope(Some(t), 1)).collect()
     };
-    let rest = |left_out: &[i16]| -> Vec<Slope> {
-        let all = [1, 3, 5, 7].into_iter();
-        all.filter(|s| !left_out.contains(s)).map(slope).collect()
-    };
-    let forgotten = amend(&mut out, &table, Change::Forget(1)).unwrap();
-    assert_eq!(of(&forgotten), rest(&[3]));
-    assert_eq!(forgotten.drift(), table.drift());
-    assert_eq!(forgotten.limits(), table.limits());
-    let mut again = vec![0; 4000];
-    let added = amend(&mut again, &forgotten, put("new")).unwrap();
-    let mut expected = rest(&[3]);
-    expected.push(pace(1).pooled);
-    assert_eq!(of(&added), expected);
-    let replaced = amend(&mut out, &table, put(&names[2])).unwrap();
-    assert_eq!(of(&replaced), rest(&[]));
-    let renamed = amend(
-        &mut out,
-        &table,
-        Change::Rename {
-            texture: 0,
-            name: "x",
-        },
-    )
-    .unwrap();
-    assert_eq!(of(&renamed), rest(&[]));
-    let added = amend(&mut out, &table, put("new")).unwrap();
-    assert_eq!(added.textures(), 5);
+    let [s0, s1, s2, s3] = [1, 3, 5, 7].map(slope);
+    let forgotten = amended(&bytes, Change::Forget(1));
+    assert_eq!(of(&forgotten), [s0, s2, s3]);
+    let added = amended(&forgotten, put("new"));
+    assert_eq!(of(&added), [s0, s2, s3, pace(1).pooled]);
+    let name = "x";
+    for change in [
+        put(table.name(2).unwrap()),
+        Change::Rename { texture: 0, name },
+    ] {
+        assert_eq!(of(&amended(&bytes, change)), [s0, s1, s2, s3]);
+    }
     // all but the slopes are as they were, and so is what a probe learns
-    assert_eq!(added.populations().unwrap().len(), 2);
+    let added = Table::read(&added).unwrap();
+    assert_eq!(
+        (added.drift(), added.limits()),
+        (table.drift(), table.limits())
+    );
+    assert_eq!(
+        (added.textures(), added.populations().unwrap().len()),
+        (4, 2)
+    );
 }
 
 #[test]

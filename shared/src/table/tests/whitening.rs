@@ -1,7 +1,7 @@
-//! The whitening against its recipe in f64.
+//! The whitening by its properties; tests/core/fused_recipe.rs has the recipe in f64.
 
-use crate::features::{MAX_FEATURES, Vector};
-use crate::table::{Scatter, WhitenError, Whitened, Whitening, white, whiten};
+use crate::features::{FeatureSet, MAX_FEATURES, Vector};
+use crate::table::{Drift, Scatter, WhitenError, Whitened, Whitening, white, whiten_drifting};
 use std::vec;
 use std::vec::Vec as List;
 
@@ -91,6 +91,14 @@ impl World {
     }
 }
 
+fn whiten(scatters: &[Scatter]) -> Result<List<Whitening>, WhitenError> {
+    let learned = whiten_drifting(scatters, FeatureSet::Bands, Drift::NONE)?;
+    Ok(learned
+        .into_iter()
+        .map(|(whitening, _)| whitening)
+        .collect())
+}
+
 /// Learned as a table is: movement by movement, texture by texture.
 pub(crate) fn learned(slides: &[List<List<Vector>>]) -> List<Whitening> {
     let scatters: List<Scatter> = slides
@@ -103,172 +111,7 @@ pub(crate) fn learned(slides: &[List<List<Vector>>]) -> List<Whitening> {
             scatter
         })
         .collect();
-    whiten(&scatters).unwrap().into_iter().collect()
-}
-
-type Matrix = List<List<f64>>;
-
-/// Step 2 and 3 of the recipe, in units of the features: W and g of every movement.
-fn recipe(slides: &[List<List<Vector>>]) -> List<(Matrix, List<f64>)> {
-    let d = slides[0][0][0].len();
-    let unit = |x: &Vector| -> List<f64> { x.iter().map(|x| f64::from(*x) / 1024.0).collect() };
-    let mean = |x: &[List<f64>]| -> List<f64> {
-        (0..d)
-            .map(|i| x.iter().map(|x| x[i]).sum::<f64>() / x.len() as f64)
-            .collect()
-    };
-    let square = || vec![vec![0.0; d]; d];
-    // S, K (n - 1) and g of every movement
-    let mut pooled: List<(Matrix, f64, List<f64>)> = List::new();
-    for textures in slides {
-        let (mut s, mut freedom, mut all) = (square(), 0.0, List::new());
-        for slides in textures {
-            let x: List<List<f64>> = slides.iter().map(unit).collect();
-            let mu = mean(&x);
-            freedom += x.len() as f64 - 1.0;
-            for x in &x {
-                for i in 0..d {
-                    for j in 0..d {
-                        s[i][j] += (x[i] - mu[i]) * (x[j] - mu[j]);
-                    }
-                }
-            }
-            all.extend(x);
-        }
-        s.iter_mut().flatten().for_each(|s| *s /= freedom);
-        pooled.push((s, freedom, mean(&all)));
-    }
-    let movements = pooled.len() as f64;
-    let mut average = square();
-    for (s, ..) in &pooled {
-        for i in 0..d {
-            for j in 0..d {
-                average[i][j] += s[i][j] / movements;
-            }
-        }
-    }
-    let whitening = |(s, freedom, g): &(Matrix, f64, List<f64>)| {
-        let blend = 15.0 / (15.0 + freedom);
-        let mut s = s.clone();
-        for i in 0..d {
-            for j in 0..d {
-                s[i][j] = (1.0 - blend) * s[i][j] + blend * average[i][j];
-            }
-        }
-        let sd: List<f64> = (0..d).map(|i| s[i][i].sqrt()).collect();
-        let (df, mut t) = (d as f64, 0.0);
-        for i in 0..d {
-            for j in 0..d {
-                s[i][j] /= sd[i] * sd[j];
-                t += s[i][j] * s[i][j];
-            }
-        }
-        let lambda = ((1.0 - 2.0 / df) * t + df * df) / ((freedom + 1.0 - 2.0 / df) * (t - df));
-        let lambda = if lambda.is_finite() && (0.0..1.0).contains(&lambda) {
-            lambda
-        } else {
-            1.0
-        };
-        for i in 0..d {
-            for j in 0..d {
-                let one = if i == j { 1.0 } else { 0.0 };
-                s[i][j] = ((1.0 - lambda) * s[i][j] + lambda * one) * sd[i] * sd[j];
-            }
-        }
-        (inverse(&cholesky(&s)), g.clone())
-    };
-    pooled.iter().map(whitening).collect()
-}
-
-/// L with L L' = S, column by column.
-fn cholesky(s: &Matrix) -> Matrix {
-    let d = s.len();
-    let mut rest = s.clone();
-    let mut l = vec![vec![0.0; d]; d];
-    for k in 0..d {
-        let pivot = rest[k][k].sqrt();
-        for i in k..d {
-            l[i][k] = rest[i][k] / pivot;
-        }
-        for i in k..d {
-            for j in k..d {
-                rest[i][j] -= l[i][k] * l[j][k];
-            }
-        }
-    }
-    l
-}
-
-/// Gauss and Jordan's.
-fn inverse(a: &Matrix) -> Matrix {
-    let d = a.len();
-    let mut work: Matrix = a
-        .iter()
-        .enumerate()
-        .map(|(i, row)| {
-            let unit = (0..d).map(|j| if i == j { 1.0 } else { 0.0 });
-            row.iter().copied().chain(unit).collect()
-        })
-        .collect();
-    for k in 0..d {
-        let pivot = work[k][k];
-        work[k].iter_mut().for_each(|x| *x /= pivot);
-        let row = work[k].clone();
-        for (i, other) in work.iter_mut().enumerate() {
-            let factor = other[k];
-            if i != k {
-                other
-                    .iter_mut()
-                    .zip(&row)
-                    .for_each(|(x, r)| *x -= factor * r);
-            }
-        }
-    }
-    work.into_iter().map(|row| row[d..].to_vec()).collect()
-}
-
-#[test]
-fn whitens_by_the_recipe() {
-    for (seed, (textures, movements, features, each)) in (1..).zip([
-        (20, 3, 13, 5),
-        (117, 3, 14, 5),
-        (3, 1, 13, 2),
-        (1, 2, 13, 2),
-        (5, 4, 3, 4),
-        (6, 2, 1, 3),
-        (10, 36, 5, 15),
-    ]) {
-        let noise = &mut Noise(seed);
-        let world = World::new(noise, textures, movements, features);
-        let slides = world.slides(noise, each);
-        let whitenings = learned(&slides);
-        let recipe = recipe(&slides);
-        assert_eq!((whitenings.len(), recipe.len()), (movements, movements));
-        for (movement, (whitening, (w, g))) in whitenings.iter().zip(&recipe).enumerate() {
-            for n in 0..100 {
-                let x = world.slide(noise, n % textures, movement);
-                let other = world.slide(noise, (n + 1) % textures, movement);
-                // g in whole steps
-                let mean: Vector = g.iter().map(|g| (g * 1024.0).round() as i16).collect();
-                assert!(whitening.apply(&mean).iter().all(|&z| z == 0));
-                // canonical variates are the recipe's, turned: all distances are the same
-                for from in [&mean, &other] {
-                    let white = whitening.apply(&x).into_iter().zip(whitening.apply(from));
-                    let turned = white.map(|(z, from)| f64::from(z) - f64::from(from));
-                    let row = |i: usize| -> f64 {
-                        let apart = |j: usize| f64::from(x[j]) - f64::from(from[j]);
-                        (0..=i).map(|j| w[i][j] * apart(j) / 4.0).sum()
-                    };
-                    let distance = (0..features).map(row).map(|z| z * z).sum::<f64>().sqrt();
-                    let error = turned.map(|z| z * z).sum::<f64>().sqrt() - distance;
-                    assert!(
-                        error.abs() <= 2.0 * (features as f64).sqrt() + 1e-3 * distance,
-                        "{seed}: {error} {distance}"
-                    );
-                }
-            }
-        }
-    }
+    whiten(&scatters).unwrap()
 }
 
 /// A singular covariance is no reason to fail: a feature that never changes counts by its rounding, one that follows
@@ -331,42 +174,6 @@ fn canonical_variates_of_textures_are_uncorrelated() {
                 let off = covariance(i, j).abs();
                 let most = 2e-3 * largest;
                 assert!(off <= most, "{seed}: {i} {j}: {off} of {largest}");
-            }
-        }
-    }
-}
-
-/// But for what the shrinking takes from directions that hardly scatter: little of four features, more of thirteen.
-#[test]
-fn the_scatter_of_a_texture_is_1_in_every_direction() {
-    for (features, most) in [(1, 0.01), (4, 0.05), (13, 0.2)] {
-        let noise = &mut Noise(77);
-        let world = World::new(noise, 60, 1, features);
-        let slides = world.slides(noise, 120);
-        let whitening = learned(&slides).remove(0);
-        let mut covariance = vec![vec![0.0; features]; features];
-        for slides in &slides[0] {
-            let z: List<List<f64>> = slides
-                .iter()
-                .map(|x| {
-                    let z = whitening.apply(x);
-                    z.iter().map(|z| f64::from(white(*z))).collect()
-                })
-                .collect();
-            let mean = |i: usize| z.iter().map(|z| z[i]).sum::<f64>() / 120.0;
-            let mean: List<f64> = (0..features).map(mean).collect();
-            for z in &z {
-                for i in 0..features {
-                    for j in 0..features {
-                        covariance[i][j] += (z[i] - mean[i]) * (z[j] - mean[j]) / (60.0 * 119.0);
-                    }
-                }
-            }
-        }
-        for (i, row) in covariance.iter().enumerate() {
-            for (j, c) in row.iter().enumerate() {
-                let one = if i == j { 1.0 } else { 0.0 };
-                assert!((c - one).abs() < most, "{features}: {i} {j}: {c}");
             }
         }
     }
@@ -472,6 +279,11 @@ fn without_two_slides_of_a_texture_there_is_no_whitening() {
     two.push(&[slide(5), slide(90)]).unwrap();
     assert!(whiten(&[two.clone()]).is_ok());
     assert_eq!(whiten(&[two.clone(), scatter]), Err(WhitenError::Trials(1)));
+    let said = std::format!("{}", WhitenError::Trials(1));
+    assert!(
+        said.contains("movement 2: no texture has two slides"),
+        "{said}"
+    );
     let other = Scatter::new(3);
     assert_eq!(whiten(&[two.clone(), other]), Err(WhitenError::Features));
     for features in [0, MAX_FEATURES + 1] {
@@ -545,20 +357,5 @@ fn more_slides_than_the_memory_stay_as_many() {
         far.teach(&[i16::MIN]);
         far.adapt(&[i16::MAX]);
         assert!(i32::from(far.mean[0]).abs() <= 32_768);
-    }
-}
-
-#[test]
-fn the_errors_say_what_is_missing() {
-    use std::string::ToString;
-    for (error, message) in [
-        (
-            WhitenError::Trials(1),
-            "movement 2: no texture has two slides",
-        ),
-        (WhitenError::Features, "do not have the same features"),
-        (WhitenError::Movements, "1 to 36 movements"),
-    ] {
-        assert!(error.to_string().contains(message), "{error}");
     }
 }

@@ -1,11 +1,11 @@
-//! What is right in a new rig: for the self-test's own checks, and for the host that judges its measurements.
+//! Limits of what is right in a new rig, for the host that judges its measurements.
 
 use core::ops::RangeInclusive;
 
-use crate::sensor::biotac::BioTac;
-use crate::sensor::{AtRest, PressureSensor};
+use crate::sensor::AtRest;
+use crate::sensor::biotac;
 
-const AT_REST: AtRest = BioTac::MODEL.at_rest;
+const AT_REST: AtRest = biotac::PARTS.model.at_rest;
 
 /// P_AC of a BioTac that nobody touches, counts rms. Less is a dead converter, more is a bad ground.
 pub const PAC_RMS: RangeInclusive<f32> = AT_REST.pac_noise_counts.0..=AT_REST.pac_noise_counts.1;
@@ -13,8 +13,8 @@ pub const PAC_RMS: RangeInclusive<f32> = AT_REST.pac_noise_counts.0..=AT_REST.pa
 pub const PDC: RangeInclusive<f32> = AT_REST.pdc_counts.0..=AT_REST.pdc_counts.1;
 /// P_DC rises by so much when a hand squeezes the finger, mN.
 pub const SQUEEZED_MN: f32 = 230.0;
-/// What the converter reads without current, counts: half of its reference; and how far it may be off, which is far beyond what the
-/// amplifier's resistors can do.
+/// What the converter reads without current, counts: half of its reference; and how far it may be off, which is far
+/// beyond what the amplifier's resistors can do.
 pub const CURRENT_ZERO: (f32, f32) = (2048.0, 60.0);
 /// Noise of the motor's current at rest, counts rms: 13 mA; the slowest slide draws 40.
 pub const CURRENT_RMS: f32 = 16.0;

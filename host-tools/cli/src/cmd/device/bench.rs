@@ -1,6 +1,5 @@
 //! A probe that somebody works with at a terminal: its line, the log of what is said, questions, and Ctrl-C, which
-//! leaves the rig lifted
-//! and stopped.
+//! leaves the rig lifted and stopped.
 
 use std::io::{self, Write};
 use std::pin::{Pin, pin};
@@ -11,35 +10,27 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::task::Poll;
 use std::time::Duration;
 
-use tactus_core::wire::{Event, Report, Status};
+use tactus_core::wire::{Report, Status};
 use tactus_link::bringup::Trouble;
 use tactus_link::lifting::Stopped;
-use tactus_link::line::Line;
+use tactus_link::line::{Line, LineError};
 use tactus_link::lock::PortLock;
-use tactus_link::log;
+use tactus_link::log::{self, Log};
 use tactus_link::person::{Question, QuestionKind};
 use tactus_link::probe::{GREETING, TIMEOUT};
 use tactus_link::{OperationError, Port, Probe, Transaction};
 
-use super::history::History;
-use super::line::{Emulator, OpenError, Where};
-use super::log::Log;
-use super::loss::{Consent, can_be_asked};
+use super::line::{Consent, Where};
 use crate::cmd::output::Format;
 
-/// An emulated board may go slower than real time.
-const EMULATED: Duration = Duration::from_secs(30);
-
-/// An error at the bench, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BenchError {
     /// There is no line.
     #[error(transparent)]
-    Open(#[from] OpenError),
+    Open(#[from] LineError),
     /// An operation failed, or was stopped.
     #[error(transparent)]
     Operation(#[from] OperationError),
-    /// The log cannot be written.
     #[error("{0}; the rig was stopped and lifted")]
     Log(io::Error),
     /// A bring-up did not reach its end.
@@ -48,7 +39,6 @@ pub(crate) enum BenchError {
     /// There can be no log, or what is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// Nobody can be asked.
     #[error("nothing was changed: there is nobody to ask; add --yes to do it")]
     Nobody,
 }
@@ -82,29 +72,22 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Returns true where there was one since the last time.
     pub(crate) fn take(&self) -> bool {
         self.0.swap(false, Relaxed)
     }
 }
 
-/// A probe that somebody works with.
 pub(crate) struct Bench {
     port: Port<Box<dyn Line>>,
-    probe: Probe,
+    pub(crate) probe: Probe,
     pub(crate) name: String,
-    interrupt: Interrupt,
+    pub(crate) interrupt: Interrupt,
     log: Option<Log>,
-    history: History,
     format: Format,
-    consent: Consent,
-    /// the file that the probe's table was kept in
-    backup: Option<String>,
+    pub(crate) consent: Consent,
     /// what failed here while an operation is being stopped
     failed: Option<BenchError>,
-    /// ends last
-    _emulator: Option<Emulator>,
-    _lock: Option<PortLock>,
+    _lock: PortLock,
 }
 
 impl Bench {
@@ -113,57 +96,20 @@ impl Bench {
         let interrupt = Interrupt::catch()?;
         let open = place.open()?;
         let log = place.log.as_ref().map(|path| Log::create(path, &open.name));
-        let (greeting, timeout) = match open.emulator {
-            Some(_) => (EMULATED, EMULATED),
-            None => (GREETING, TIMEOUT),
-        };
-        let probe = Probe::new(&open.name, greeting, timeout);
+        let probe = Probe::new(&open.name, GREETING, TIMEOUT);
         let mut bench = Self {
             port: Port::new(open.line, probe.clone()),
             probe: probe.clone(),
             interrupt,
             log: log.transpose()?,
-            history: History::of(&open.name),
             format,
             consent: Consent::default(),
-            backup: None,
             failed: None,
             name: open.name,
-            _emulator: open.emulator,
             _lock: open.lock,
         };
         let status = bench.done(probe.hello(), &mut io::sink())?;
         Ok((bench, status))
-    }
-
-    /// The probe, for operations.
-    pub(crate) fn probe(&self) -> Probe {
-        self.probe.clone()
-    }
-
-    /// From now on something may be taken from the probe like this.
-    pub(crate) fn consents(&mut self, consent: &Consent) {
-        self.consent = consent.clone();
-    }
-
-    /// The file that the probe's table was kept in before something was lost.
-    pub(crate) fn backup(&self) -> Option<String> {
-        self.backup.clone()
-    }
-
-    /// Frames that were damaged, and reports that were lost on the line.
-    pub(crate) fn losses(&self) -> (u64, u64) {
-        self.probe.losses()
-    }
-
-    /// The memory of this PC of the probe.
-    pub(crate) fn history(&self) -> &History {
-        &self.history
-    }
-
-    /// Ctrl-C, for those who wait for something else than the probe.
-    pub(crate) fn interrupt(&self) -> &Interrupt {
-        &self.interrupt
     }
 
     /// Does an operation, and prints its words where they are for people. Whatever ends it early leaves the rig stopped
@@ -204,10 +150,9 @@ impl Bench {
         }
         if let Some(backup) = self.probe.backup() {
             let kept = self.consent.keep(&backup.name, &backup.bytes);
-            let kept = kept.inspect(|file| self.backup = Some(file.clone()));
-            self.probe.kept(
-                kept.map(|file| format!("`tactus device table push {file}` brings it back.")),
-            );
+            let kept =
+                kept.map(|file| format!("`tactus device table push {file}` brings it back."));
+            self.probe.kept(kept.map_err(|why| format!("{why:#}")));
         }
         if let Some(question) = self.probe.question() {
             match self.ask(&question, out) {
@@ -236,17 +181,9 @@ impl Bench {
             if let Some(log) = &mut self.log {
                 log.line(&line);
             }
-            let log::Line::Report(report) = &line else {
-                continue;
-            };
-            self.history.hear(report);
-            if let Event::Chosen {
-                slide, movement, ..
-            } = &report.event
-            {
-                tracing::info!(slide, %movement, "the probe chooses");
+            if let log::Line::Report(report) = &line {
+                each(report);
             }
-            each(report);
         }
         if let Some(Err(why)) = self.log.as_mut().map(Log::flush) {
             self.log = None;
@@ -259,15 +196,12 @@ impl Bench {
         let Question { said, asked, kind } = question;
         let prompt = match kind {
             QuestionKind::Consent => {
-                match self.format {
-                    Format::Text => writeln!(out, "{said}")?,
-                    Format::Json => eprintln!("{said}"),
-                }
+                writeln!(out, "{said}")?;
                 out.flush()?;
                 if self.consent.yes {
                     return Ok(Some(true));
                 }
-                can_be_asked(false)?;
+                self.consent.can_be_given()?;
                 format!("{asked} [y/N] ")
             }
             QuestionKind::Moved => format!("{asked}, then press Enter (n: it stays): "),
@@ -288,25 +222,22 @@ impl Bench {
         }))
     }
 
-    /// Does one request.
     pub(crate) fn get<E: Transaction>(&mut self, transaction: E) -> Result<E::Outcome, BenchError> {
-        let probe = self.probe();
+        let probe = self.probe.clone();
         self.done(probe.get(transaction), &mut io::sink())
     }
 
-    /// The table that the probe uses.
     pub(crate) fn table(&mut self) -> Result<Arc<[u8]>, BenchError> {
-        let probe = self.probe();
+        let probe = self.probe.clone();
         self.done(probe.table(), &mut io::sink())
     }
 
     /// Reads once while nothing is asked for.
     pub(crate) fn listen(&mut self, each: &mut dyn FnMut(&Report)) -> Result<(), BenchError> {
-        let probe = self.probe();
+        let probe = self.probe.clone();
         let mut heard = pin!(async { probe.listen().map(drop) });
         self.port.turn(true);
-        let listened = self.poll(heard.as_mut(), &mut io::sink(), each);
-        match listened {
+        match self.poll(heard.as_mut(), &mut io::sink(), each) {
             Poll::Ready(listened) => listened,
             Poll::Pending => Ok(()),
         }
@@ -315,7 +246,7 @@ impl Bench {
     /// Stops whatever is done, and waits until the finger is lifted and nothing moves. A second Ctrl-C ends the
     /// waiting.
     pub(crate) fn lift(&mut self) -> Result<Stopped, BenchError> {
-        let probe = self.probe();
+        let probe = self.probe.clone();
         self.done(probe.lift(), &mut io::sink())
     }
 }

@@ -10,13 +10,13 @@ use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_link::Request;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, STEPS,
-    Step, Trouble, judge,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, Step,
+    Trouble, judge,
 };
 
 use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
-use crate::cmd::output::{Format, print_json};
+use crate::cmd::output::Format;
 
 /// Bring up a new rig: check its parts and wires step by step, and name what is wrong
 #[derive(clap::Args)]
@@ -24,11 +24,10 @@ use crate::cmd::output::{Format, print_json};
 Examples:
   cargo xtask flash --self-test            the image that measures; it stays on the board until it has passed
   tactus device bringup                    goes on where it stopped last time
-  tactus device bringup --list             the steps, and what is right in each
   tactus device bringup --report rig2      another rig
 
-Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each step that is over is
-kept in DIR/journal.jsonl; DIR/report.txt, report.json and the curves beside them are to be sent to somebody who helps.
+Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each
+step that is over is kept in DIR/journal.jsonl; DIR/report.txt and report.json are to be sent to somebody who helps.
 Ctrl-C stops whatever moves; the exit code is 130 then. It is 1 while a step has not passed.")]
 pub(crate) struct Args {
     /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
@@ -37,12 +36,6 @@ pub(crate) struct Args {
     /// Folder of the journal and of the report
     #[arg(long, value_name = "DIR", default_value = "bringup")]
     report: PathBuf,
-    /// List the steps, and what has passed in DIR, without a board
-    #[arg(long)]
-    list: bool,
-    /// How to print the report
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
 /// A board that starts answers within this.
@@ -55,18 +48,7 @@ const TRIES: u32 = 3;
 /// The board listens for a second when it starts.
 const HELLO: Duration = Duration::from_millis(200);
 
-/// Goes through the steps.
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    if how.list {
-        let journal = how.report.join("journal.jsonl");
-        return list(
-            journal
-                .exists()
-                .then(|| Journal::open(&journal))
-                .transpose()?,
-            out,
-        );
-    }
     std::fs::create_dir_all(&how.report)?;
     let mut journal = Journal::open(&how.report.join("journal.jsonl"))?;
     let interrupt = Interrupt::catch()?;
@@ -99,13 +81,10 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     };
     let report = Report::new(&journal);
     report.write(&how.report)?;
-    match how.format {
-        Format::Text => write!(out, "{}", report.text())?,
-        Format::Json => print_json(&report, out)?,
-    }
+    write!(out, "{}", report.text())?;
     out.flush()?;
     let folder = how.report.display();
-    eprintln!("The report is in {folder}: report.txt, report.json and curves.");
+    eprintln!("The report is in {folder}: report.txt and report.json.");
     match done.map_err(BenchError::BringUp)? {
         Ended::Passed => {
             eprintln!(
@@ -113,14 +92,14 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             );
         }
         Ended::Flash(_) => eprintln!(
-            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does the last steps"
+            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does \
+             the last steps"
         ),
         Ended::Failed => bail!("a step has not passed; the same command runs it again"),
     }
     Ok(())
 }
 
-/// The rig's firmware at the other end of the link.
 struct Linked(Bench);
 
 impl Probe for Linked {
@@ -129,7 +108,7 @@ impl Probe for Linked {
         command: Command,
         each: &mut dyn FnMut(&ProbeReport),
     ) -> Result<Result<(), String>, Trouble> {
-        let probe = self.0.probe();
+        let probe = self.0.probe.clone();
         let done = probe.run(Request::command(command), |report| {
             each(report);
             Ok(())
@@ -145,26 +124,6 @@ impl Probe for Linked {
     }
 }
 
-fn list(journal: Option<Journal>, out: &mut impl Write) -> anyhow::Result<()> {
-    for step in STEPS {
-        let last = journal.as_ref().and_then(|journal| journal.last(step.key));
-        let state = match last {
-            None => "to do",
-            Some(entry) if entry.passed => "passed",
-            Some(_) => "FAILED",
-        };
-        writeln!(
-            out,
-            "{state:<7} {:<13} {}: {}",
-            step.key,
-            step.checks,
-            (step.limit)()
-        )?;
-    }
-    Ok(())
-}
-
-/// The self-test at the other end of a serial line.
 struct Serial {
     open: Open,
     line: Line,

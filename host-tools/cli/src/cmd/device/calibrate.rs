@@ -4,21 +4,17 @@ use std::io::Write;
 
 use anyhow::ensure;
 use clap::ArgGroup;
-use serde::Serialize;
-use tactus_core::rig::calibration::RigCalibration;
 use tactus_link::operations::{self, Calibrating};
-use tactus_link::say::{date, sensor, turned};
 
 use super::bench::Bench;
 use super::line::Where;
-use crate::cmd::output::{Format, print_json};
+use crate::cmd::output::Format;
 
-/// Measure what differs from rig to rig, or show and set it
+/// Measure what differs from rig to rig, or set it
 #[derive(clap::Args)]
 #[command(group(ArgGroup::new("scale").args(["force_mn_per_count", "turn_over", "weights"])), after_help = "\
 Examples:
   tactus device calibrate                   measures the motor's current without load, and P_DC in the air
-  tactus device calibrate --show            what is in use
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
   tactus device calibrate --weights 30g,60g,90g,120g,150g
                                             asks for these weights on the lifted finger
@@ -26,106 +22,53 @@ Examples:
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale
 
-What a count of P_DC is worth in mN has a day only once it was measured: with --weights, or with --force-mn-per-count.
-Until then it is the paper's, of another finger.")]
+`tactus device status` shows what is in use. What a count of P_DC is worth in mN has a day only once it was
+measured: with --weights, or with --force-mn-per-count. Until then it is the paper's, of another finger.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
-    /// Print what is in use, and change nothing
-    #[arg(long, conflicts_with_all = ["drifted", "date", "newton_per_ampere", "force_mn_per_count", "weights"])]
-    show: bool,
-    /// Measure what a count of acceleration is worth, and nothing else: the finger points straight down and keeps still, then straight
-    /// up. For a finger with an accelerometer
-    #[arg(long, conflicts_with_all = ["show", "drifted", "newton_per_ampere"])]
+    /// Measure what a count of acceleration is worth, and nothing else: the finger points straight down and keeps
+    /// still, then straight up. For a finger with an accelerometer
+    #[arg(long, conflicts_with_all = ["drifted", "newton_per_ampere"])]
     turn_over: bool,
-    /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
+    /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it
+    /// anew
     #[arg(long)]
     drifted: bool,
-    /// The day on which the force per count, or the acceleration per count, was measured, as 20261121; today unless given
-    #[arg(long, value_name = "YYYYMMDD", requires = "scale", value_parser = clap::value_parser!(u32).range(20_000_101..=29_991_231))]
-    date: Option<u32>,
     /// Shear per motor current, N/A, from pulls on an inclined stage
     #[arg(long, value_name = "X")]
     newton_per_ampere: Option<f32>,
     /// Contact force per count of P_DC, mN, measured by presses on a scale
     #[arg(long, value_name = "X")]
     force_mn_per_count: Option<f32>,
-    /// Three known weights or more, N, or g as in 30g, which the probe asks for one after the other: each is laid on the finger,
-    /// or a kitchen scale is pressed against it until it shows that
+    /// Three known weights or more, N, or g as in 30g, which the probe asks for one after the other: each is laid on
+    /// the finger, or a kitchen scale is pressed against it until it shows that
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newton)]
     weights: Vec<u16>,
-    /// How to print what is in use
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// What `device calibrate --format json` prints, and a part of `device status`.
-#[derive(Serialize)]
-pub(crate) struct CalibrationSummary {
-    /// The day on which the force per count was measured, as "2026-11-21"; "not known" where that was done without a computer;
-    /// `null`: it was not, and is the paper's.
-    force_scale_date: Option<String>,
-    sensor: Option<String>,
-    pdc_in_the_air_counts: f32,
-    /// Whether that was measured.
-    air_known: bool,
-    force_mn_per_count: f32,
-    /// Motor current without load at standstill, and more of it for each mm/s.
-    unloaded_ma: f32,
-    unloaded_ma_per_mm_s: f32,
-    shear_n_per_a: f32,
-    /// The day on which an accelerometer was turned over, as `force_scale_date`.
-    turned_over: Option<String>,
-    /// What that said of a count of P_AC, mg; `null`: it was not.
-    mg_per_count: Option<f32>,
-}
-
-impl CalibrationSummary {
-    pub(crate) fn new(c: &RigCalibration) -> Self {
-        let (unloaded_a, a_per_mm_s) = c.unloaded_a;
-        Self {
-            force_scale_date: date(c),
-            sensor: sensor(c),
-            pdc_in_the_air_counts: c.pressure.pdc_no_contact,
-            air_known: c.air_known,
-            force_mn_per_count: c.pressure.force_mn_per_count,
-            unloaded_ma: unloaded_a * 1e3,
-            unloaded_ma_per_mm_s: a_per_mm_s * 1e3,
-            shear_n_per_a: c.newton_per_ampere,
-            turned_over: turned(c),
-            mg_per_count: turned(c).map(|_| c.pressure.pac_pa_per_count),
-        }
-    }
-}
-
-/// Measures, shows or sets the rig's constants.
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     ensure!(
         how.weights.is_empty() || how.weights.len() >= 3,
         "a line takes three weights or more, as in --weights 30g,60g,90g,120g,150g"
     );
-    let (mut bench, _) = Bench::open(&how.at, how.format)?;
-    let probe = bench.probe();
-    let day = how.date.unwrap_or_else(today);
+    let (mut bench, _) = Bench::open(&how.at, Format::Text)?;
+    let probe = bench.probe.clone();
     let calibrating = Calibrating {
         drifted: how.drifted,
         newton_per_ampere: how.newton_per_ampere,
         force_mn_per_count: how.force_mn_per_count,
         weights: how.weights.clone(),
-        day,
+        day: today(),
     };
     let calibrated = async {
-        match (how.show, how.turn_over) {
-            (true, _) => operations::show_calibration(&probe).await,
-            (false, true) => operations::turn_over(&probe, day).await,
-            (false, false) => operations::calibrate(&probe, &calibrating).await,
+        match how.turn_over {
+            true => operations::turn_over(&probe, today()).await,
+            false => operations::calibrate(&probe, &calibrating).await,
         }
     };
-    let calibration = bench.done(calibrated, out)?;
-    match how.format {
-        Format::Text => Ok(()),
-        Format::Json => print_json(&CalibrationSummary::new(&calibration), out),
-    }
+    bench.done(calibrated, out)?;
+    Ok(())
 }
 
 /// A weight in N, or in g with a g behind it, as mN: what a fingertip's line holds for.
@@ -146,17 +89,15 @@ fn today() -> u32 {
     u32::try_from(year).unwrap_or(0) * 10_000 + u32::from(u8::from(month)) * 100 + u32::from(day)
 }
 
-/// Ends a fault.
 pub(crate) fn home(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(at, Format::Text)?;
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     Ok(bench.done(operations::home(&probe), out)?)
 }
 
-/// Stops the rig.
 pub(crate) fn stop(at: &Where, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(at, Format::Text)?;
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     Ok(bench.done(operations::stop(&probe), out)?)
 }
 

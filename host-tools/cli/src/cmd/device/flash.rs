@@ -28,10 +28,8 @@ pub(crate) struct Args {
     options: Vec<OsString>,
 }
 
-/// The chip's name in probe-rs.
 const CHIP: &str = "STM32F429ZITx";
 
-/// Flashes an image with probe-rs, or prints how.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     ensure!(
         args.dry_run || args.elf.is_file(),
@@ -63,27 +61,29 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             let status = command.status().context("probe-rs does not start")?;
             ensure!(
                 status.success(),
-                "probe-rs ended with {status}: is the board's USB plug at CN1, and no other program at its probe? LD4 must be lit"
+                "probe-rs ended with {status}: is the board's USB plug at CN1, and no other program at its probe? LD4 \
+                 must be lit"
             );
         }
     }
     Ok(())
 }
 
-/// That the program is here, and a debug probe.
 fn look_for_probe(program: &str) -> anyhow::Result<()> {
     let list = match Command::new(program).arg("list").output() {
         Err(e) if e.kind() == io::ErrorKind::NotFound => bail!(
             "probe-rs is not installed. Install it with
   cargo install probe-rs-tools --locked
-or as https://probe.rs/docs/getting-started/installation says. Without it: cargo xtask bundle, and see FLASHING.md there"
+or as https://probe.rs/docs/getting-started/installation says.
+Without it: cargo xtask bundle, and see FLASHING.md there"
         ),
         list => list.context("probe-rs does not start")?,
     };
     let said = String::from_utf8_lossy(&list.stdout);
     ensure!(
         list.status.success() && !said.contains("No debug probes"),
-        "no debug probe found. Plug the board's USB socket CN1 into this PC. On Linux the user needs the right to use it:
+        "no debug probe found. Plug the board's USB socket CN1 into this PC.
+On Linux the user needs the right to use it:
 https://probe.rs/docs/getting-started/probe-setup (udev rules)"
     );
     Ok(())

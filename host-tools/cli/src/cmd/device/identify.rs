@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::Context as _;
 use serde::Serialize;
-use tactus_core::explorer::Told;
+use tactus_core::explorer::VerdictKind;
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Status};
 use tactus_lab::eval::evaluate::Method;
@@ -26,7 +26,6 @@ use crate::cmd::plot::Plot;
 Examples:
   tactus device identify --log session.jsonl          every report is kept, and can be computed again
   tactus device identify --among burlap,silk --closed it is one of these two
-  tactus device identify --emulated --texture burlap  on the emulated board
   tactus device identify --plot pictures              as `tactus identify` draws them")]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -94,7 +93,6 @@ impl Args {
     }
 }
 
-/// What `device identify --format json` prints.
 #[derive(Serialize)]
 struct Identification {
     /// Textures that it may be.
@@ -110,7 +108,6 @@ struct Identification {
     reports_lost: u64,
 }
 
-/// Has the probe explore.
 pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     let Run { args, format, plot } = run;
     let canvas = plot.open()?;
@@ -124,7 +121,7 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     let among = if among == 0 { names.len() } else { among };
     let mut slides = Transcript::default();
     let mut exploration = Exploration::new(table);
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     let identified = operations::identify(&probe, wanted, |report| {
         slides.event(&report.event, table);
         if canvas.is_some() {
@@ -133,7 +130,7 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     });
     let (identified, answered) = bench.done(identified, out)?;
     if *format == Format::Json {
-        let (frames_damaged, reports_lost) = bench.losses();
+        let (frames_damaged, reports_lost) = probe.losses();
         let identification = Identification {
             among,
             threshold: args.stop.threshold,
@@ -149,10 +146,10 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     }
     if let Some(canvas) = canvas {
         let figures = exploration.figures(args.stop.threshold)?;
-        canvas.write("tactus device identify", &figures, out)?;
+        canvas.write(&figures, out)?;
     }
-    Ok(match answered.map(|(verdict, _)| verdict.told()) {
-        Some(Told::Sure) => Done::Fully,
+    Ok(match answered.map(|(verdict, _)| verdict.kind()) {
+        Some(VerdictKind::Sure) => Done::Fully,
         _ => Done::NotIdentified,
     })
 }

@@ -3,25 +3,21 @@
 //! [`Monitor`] is all that is known, from the reports alone; [`view`] draws it; [`run`] brings keys, reports and time
 //! together.
 
-mod keys;
 mod state;
 mod view;
 
-use std::collections::VecDeque;
 use std::io::{self, IsTerminal as _};
 use std::pin::Pin;
-use std::sync::Arc;
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use ratatui::DefaultTerminal;
-use ratatui::crossterm::event;
+use ratatui::crossterm::event::{self, KeyCode, KeyEvent, KeyModifiers};
 use tactus_core::table::Table;
 use tactus_core::wire::{Command, Identify, Report};
 use tactus_link::lifting::Stopped;
 use tactus_link::{LinkError, OperationError, PortError, Probe, Request};
 
-use self::keys::Act;
 use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
 use super::identify::Args;
@@ -33,22 +29,40 @@ const ASKED: Duration = Duration::from_secs(1);
 /// The monitor asks for the status every second, and shows a probe as silent that says nothing for so long.
 const SILENT: Duration = Duration::from_secs(3);
 
-/// A request under way; the table that it read.
-type Doing = Pin<Box<dyn Future<Output = Result<Option<Arc<[u8]>>, OperationError>>>>;
+/// The keys, in a word each.
+const KEYS: [(&str, &str); 4] = [
+    ("i", "identify"),
+    ("h", "home"),
+    ("s", "stop"),
+    ("q", "quit"),
+];
+
+type Doing = Pin<Box<dyn Future<Output = Result<(), OperationError>>>>;
 
 fn begin(probe: Probe, command: Command) -> Doing {
-    Box::pin(async move {
-        match command {
-            Command::ReadTable(_) => probe.table().await.map(Some),
-            command => {
-                let done = probe.get(Request::command(command)).await;
-                done.map(|()| None)
-            }
-        }
-    })
+    Box::pin(async move { probe.get(Request::command(command)).await })
 }
 
-/// How the user ended it.
+/// The command of a key; `Stop` may be given at any time.
+fn command_of(key: KeyEvent, wanted: &Identify) -> Option<Command> {
+    match key.code {
+        KeyCode::Char('s') | KeyCode::Esc => Some(Command::Stop),
+        KeyCode::Char('i') => Some(Command::Identify(wanted.clone())),
+        KeyCode::Char('h') => Some(Command::Home),
+        _ => None,
+    }
+}
+
+/// The way in which a key ends the monitor.
+fn end_of(key: KeyEvent) -> Option<End> {
+    match key.code {
+        KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(End::Interrupt),
+        KeyCode::Char('q') => Some(End::Quit),
+        _ => None,
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum End {
     Quit,
     Interrupt,
@@ -98,15 +112,14 @@ fn watch(
     wanted: &Identify,
 ) -> Result<End, BenchError> {
     let mut wanted = wanted.clone();
-    let mut to_do: VecDeque<Command> = VecDeque::new();
     let mut doing: Option<Doing> = None;
     let mut drawn: Option<Instant> = None;
     let mut asked: Option<Instant> = None;
     let mut heard = Instant::now();
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     probe.send(Command::Stream(true))?;
     loop {
-        if bench.interrupt().take() {
+        if bench.interrupt.take() || is_gone(&io::stdin()) {
             return Ok(End::Interrupt);
         }
         let mut hear = |report: &Report| {
@@ -120,12 +133,7 @@ fn watch(
                 .map_or_else(|why| Poll::Ready(Err(why)), |()| Poll::Pending),
         };
         match polled {
-            Poll::Ready(Ok(table)) => {
-                doing = None;
-                if let Some(bytes) = table {
-                    monitor.take_table(Table::read(&bytes).map_err(OperationError::from)?);
-                }
-            }
+            Poll::Ready(Ok(())) => doing = None,
             Poll::Pending => {}
             Poll::Ready(Err(BenchError::Operation(OperationError::Port {
                 why: PortError::Link(why),
@@ -133,7 +141,6 @@ fn watch(
             }))) if !matches!(why, LinkError::Protocol(_) | LinkError::Foreign) => {
                 // the probe said why, and goes on
                 doing = None;
-                to_do.clear();
                 monitor.note(Weight::Message, why.to_string());
             }
             Poll::Ready(Err(why)) => return Err(why),
@@ -149,59 +156,38 @@ fn watch(
         if std::mem::take(&mut monitor.rebooted) {
             probe.send(Command::Stream(true))?;
         }
-        if doing.is_none()
-            && let Some(command) = to_do.pop_front()
-        {
-            doing = Some(begin(probe.clone(), command));
-        }
         if asked.is_none_or(|at| at.elapsed() >= ASKED) {
             asked = Some(Instant::now());
             probe.send(Command::Status)?;
         }
         monitor.silent = Some(heard.elapsed()).filter(|silent| *silent >= SILENT);
-        monitor.losses = bench.losses();
+        monitor.losses = probe.losses();
         if drawn.is_none_or(|at| at.elapsed() >= DRAWN) {
             drawn = Some(Instant::now());
             terminal.draw(|frame| view::draw(monitor, frame))?;
-        }
-        if is_gone(&io::stdin()) {
-            return Ok(End::Interrupt);
         }
         while event::poll(Duration::ZERO)? {
             let Some(key) = event::read()?.as_key_press_event() else {
                 continue;
             };
-            let busy = doing.is_some() || !to_do.is_empty();
-            match keys::press(monitor, key, busy) {
-                Some(Act::Interrupt) => return Ok(End::Interrupt),
-                Some(Act::Quit) => return Ok(End::Quit),
-                Some(Act::Stop) => {
-                    to_do.clear();
+            if let Some(end) = end_of(key) {
+                return Ok(end);
+            }
+            match command_of(key, &wanted) {
+                None => {}
+                Some(Command::Stop) => {
                     probe.send(Command::Stop)?;
                     monitor.asked(&Command::Stop);
                 }
-                Some(Act::Identify) => {
-                    if monitor.table_crc != monitor.status.table_crc {
-                        to_do.push_back(Command::ReadTable(0));
-                    }
-                    let identify = Command::Identify(wanted.clone());
-                    monitor.asked(&identify);
-                    to_do.push_back(identify);
+                Some(_) if doing.is_some() => {
+                    monitor.note(Weight::Message, "it is busy: wait, or stop it with s");
+                }
+                Some(command) => {
+                    monitor.asked(&command);
+                    doing = Some(begin(probe.clone(), command));
                     // the next one begins elsewhere on the sample
                     wanted.seed = wanted.seed.wrapping_add(1);
                 }
-                Some(Act::Home) => {
-                    monitor.asked(&Command::Home);
-                    to_do.push_back(Command::Home);
-                }
-                Some(Act::Teach(name)) => {
-                    let teach = Command::Label(name);
-                    monitor.asked(&teach);
-                    to_do.push_back(teach);
-                    // what it feels most like now
-                    to_do.push_back(Command::ReadTable(0));
-                }
-                None => {}
             }
         }
     }

@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use serde::Serialize;
 use tactus_lab::data::recording::{Labels, Texture};
 use tactus_lab::data::recordings::RecordingWriter;
 use tactus_lab::eval::show::count;
@@ -12,10 +11,9 @@ use tactus_link::operations::ask_to_lay;
 use tactus_link::person::QuestionKind;
 
 use super::bench::Bench;
-use super::line::Where;
-use super::samples::Sample;
+use super::line::{Sample, Where};
 use super::train::seed_of_now;
-use crate::cmd::output::{Format, print_json};
+use crate::cmd::output::Format;
 
 /// Record slides in the project's format, for `tactus learn` and `tactus evaluate`
 #[derive(clap::Args)]
@@ -26,9 +24,9 @@ Examples:
   tactus device record burlap silk --out anna --operator Anna --lot 7     for tactus report
   tactus device record burlap silk --out turned --moved     on a turntable; the table learned from it says so
   tactus device record burlap silk --out there --same-spot  without asking to move the sample
-A slide on the same track again says little about a texture. So at a terminal the rig stops after each slide of all movements of
-the probe's table, its finger lifted, and you are asked to move or turn the sample. What came of that stands beside each slide.
-The same command goes on with the texture at which an interrupted one stopped.")]
+A slide on the same track again says little about a texture. So at a terminal the rig stops after each slide of all
+movements of the probe's table, its finger lifted, and you are asked to move or turn the sample. What came of that
+stands beside each slide. The same command goes on with the texture at which an interrupted one stopped.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -48,46 +46,15 @@ pub(crate) struct Args {
     #[arg(long, default_value = "", hide_default_value = true)]
     lot: String,
     /// Who makes the slides, for `tactus report`
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "",
-        hide_default_value = true
-    )]
+    #[arg(long, default_value = "", hide_default_value = true)]
     operator: String,
     /// Anything else that is to stand beside every slide
-    #[arg(
-        long,
-        value_name = "TEXT",
-        default_value = "",
-        hide_default_value = true
-    )]
+    #[arg(long, default_value = "", hide_default_value = true)]
     note: String,
     #[command(flatten)]
     sample: Sample,
-    /// How to print what was recorded
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// The object that `device record` prints with `--format json`.
-#[derive(Serialize)]
-struct Recorded<'a> {
-    folder: String,
-    textures: usize,
-    /// In the folder, those of an interrupted recording included.
-    slides: usize,
-    lost: Vec<Lost<'a>>,
-}
-
-/// A slide that was made and is not recorded.
-#[derive(Serialize)]
-struct Lost<'a> {
-    texture: &'a str,
-    why: String,
-}
-
-/// Records each texture in turn.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let Args {
         textures, slides, ..
@@ -102,7 +69,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         textures.join(" ")
     );
     let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
-    let (mut bench, status) = Bench::open(&args.at, args.format)?;
+    let (mut bench, status) = Bench::open(&args.at, Format::Text)?;
     writer.label(Labels {
         lot: args.lot.trim().to_owned(),
         operator: args.operator.trim().to_owned(),
@@ -111,8 +78,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         finger: status.finger,
         calibrated: status.calibrated,
     });
-    let (probe, mut words) = (bench.probe(), bench.probe().words());
-    let (mut written, mut all_lost) = (0, Vec::new());
+    let (probe, mut words) = (bench.probe.clone(), bench.probe.words());
+    let mut written = 0;
     for (index, name) in textures.iter().enumerate() {
         let there = writer.slides(index);
         if there == usize::from(*slides) {
@@ -141,22 +108,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             writer.write(slide)?;
         }
         written += recorded.slides.len();
-        all_lost.extend(recorded.lost.into_iter().map(|why| Lost {
-            texture: name.trim(),
-            why: why.to_string(),
-        }));
     }
     writer.finish()?;
     let folder = args.out.display();
-    if args.format == Format::Json {
-        let recorded = Recorded {
-            folder: folder.to_string(),
-            textures: textures.len(),
-            slides: written,
-            lost: all_lost,
-        };
-        return print_json(&recorded, out);
-    }
     // of textures that were recorded before
     out.write_all(&probe.take_words())?;
     writeln!(

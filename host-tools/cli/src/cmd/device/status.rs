@@ -4,15 +4,16 @@ use std::io::Write;
 
 use serde::Serialize;
 use tactus_core::rig::Fault;
+use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::Status;
 use tactus_link::operations;
+use tactus_link::say::{date, sensor, turned};
 
 use super::bench::Bench;
-use super::calibrate::CalibrationSummary;
 use super::line::Where;
 use crate::cmd::output::{Format, print_json};
 
-/// Show the state of the probe: rig, faults, table, counters
+/// Show the state of the probe: rig, faults, table, counters, constants, settings
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -26,7 +27,6 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// What `device status --format json` prints.
 #[derive(Serialize)]
 struct Summary<'a> {
     port: &'a str,
@@ -44,15 +44,52 @@ struct Summary<'a> {
     calibration: CalibrationSummary,
 }
 
-/// Prints the probe's status.
+#[derive(Serialize)]
+struct CalibrationSummary {
+    /// The day on which the force per count was measured, as "2026-11-21"; "not known" where that was done without a
+    /// computer; `null`: it was not, and is the paper's.
+    force_scale_date: Option<String>,
+    sensor: Option<String>,
+    pdc_in_the_air_counts: f32,
+    /// Whether that was measured.
+    air_known: bool,
+    force_mn_per_count: f32,
+    /// Motor current without load at standstill, and more of it for each mm/s.
+    unloaded_ma: f32,
+    unloaded_ma_per_mm_s: f32,
+    shear_n_per_a: f32,
+    /// The day on which an accelerometer was turned over, as `force_scale_date`.
+    turned_over: Option<String>,
+    /// What that said of a count of P_AC, mg; `null`: it was not.
+    mg_per_count: Option<f32>,
+}
+
+impl CalibrationSummary {
+    fn new(c: &RigCalibration) -> Self {
+        let (unloaded_a, a_per_mm_s) = c.unloaded_a;
+        Self {
+            force_scale_date: date(c),
+            sensor: sensor(c),
+            pdc_in_the_air_counts: c.pressure.pdc_no_contact,
+            air_known: c.air_known,
+            force_mn_per_count: c.pressure.force_mn_per_count,
+            unloaded_ma: unloaded_a * 1e3,
+            unloaded_ma_per_mm_s: a_per_mm_s * 1e3,
+            shear_n_per_a: c.newton_per_ampere,
+            turned_over: turned(c),
+            mg_per_count: turned(c).map(|_| c.pressure.pac_pa_per_count),
+        }
+    }
+}
+
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&args.at, args.format)?;
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     let (status, calibration) = bench.done(operations::status(&probe), out)?;
     if args.format == Format::Text {
         return Ok(());
     }
-    let (frames_damaged, reports_lost) = bench.losses();
+    let (frames_damaged, reports_lost) = probe.losses();
     let (joule, wear) = status.skin_mj;
     let [skin_j, wear_j] = [joule, wear].map(|mj| f64::from(mj) * 1e-3);
     let summary = Summary {

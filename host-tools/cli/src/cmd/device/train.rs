@@ -10,8 +10,7 @@ use tactus_link::operations::Training;
 use tactus_link::say::{name_of, not_noted};
 
 use super::bench::Bench;
-use super::line::Where;
-use super::samples::Sample;
+use super::line::{Sample, Where};
 use crate::cmd::names;
 use crate::cmd::output::{Format, print_json};
 
@@ -24,8 +23,8 @@ Examples:
   tactus device train burlap --same-spot    without asking to move the sample
 
 A slide on the same track again says little about a texture. So at a terminal the rig stops after each trial of all
-movements, its finger lifted, and you are asked to move or turn the sample. What came of that stands in the probe's table,
-for `tactus table show` and `tactus report`.")]
+movements, its finger lifted, and you are asked to move or turn the sample. What came of that stands in the probe's
+table, for `tactus table` and `tactus report`.")]
 pub(crate) struct Train {
     #[command(flatten)]
     at: Where,
@@ -34,7 +33,8 @@ pub(crate) struct Train {
     /// Trials of each movement, those of an unfinished training included
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..))]
     trials: u8,
-    /// Make all movements of the grid up to 1.26 N, or 2 N where that is set, instead of the table's, to find out which tell textures apart
+    /// Make all movements of the grid up to 1.26 N, or 2 N where that is set, instead of the table's, to find out which
+    /// tell textures apart
     #[arg(long)]
     pilot: bool,
     /// Where on the sample slides begin; drawn anew unless given
@@ -62,7 +62,6 @@ pub(crate) struct Teach {
     format: Format,
 }
 
-/// The object that `device train` and `device teach` print with `--format json`.
 #[derive(Serialize)]
 struct Summary {
     #[serde(flatten)]
@@ -71,7 +70,6 @@ struct Summary {
     nearest: Option<Alike>,
 }
 
-/// Has the probe make slides of a texture and learn it.
 pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
     let typed = name_of(&args.name)?;
     let (mut bench, _) = Bench::open(&args.at, args.format)?;
@@ -82,12 +80,11 @@ pub(crate) fn train(args: &Train, out: &mut impl Write) -> anyhow::Result<()> {
         seed: args.seed.unwrap_or_else(seed_of_now),
         sample: args.sample.known(),
     };
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     let learned = bench.done(operations::train(&probe, &training), out)?;
     print(learned, args.format, out)
 }
 
-/// Names the texture of the last exploration.
 pub(crate) fn teach(
     Teach { at, name, format }: &Teach,
     out: &mut impl Write,
@@ -95,7 +92,7 @@ pub(crate) fn teach(
     let typed = name_of(name)?;
     let (mut bench, _) = Bench::open(at, *format)?;
     let name = known_as(typed, &bench.table()?)?;
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     let learned = bench.done(operations::teach(&probe, &name), out)?;
     print(learned, *format, out)
 }
@@ -121,7 +118,6 @@ fn known_as(typed: Name, table: &[u8]) -> anyhow::Result<Name> {
     Ok(known.unwrap_or(Ok(typed))?)
 }
 
-/// Another number every time.
 pub(crate) fn seed_of_now() -> u32 {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     now.map_or(1, |now| now.as_secs() as u32 ^ now.subsec_nanos())

@@ -20,10 +20,9 @@ use crate::cmd::output::{Done, Format, print_json};
 Examples:
   tactus device verify cork                        the same, different, or not sure yet
   tactus device verify cork --false-alarm 0.005    of its own slides, one in 200 may be called different
-  tactus device verify cork --emulated --texture cork
 
-The probe slides until it is sure, --max-slides at most. Its go / no-go output is high from the answer \"the same\" until the
-next `verify` begins. Exit code: 0 the same, 3 different or not sure.")]
+The probe slides until it is sure, --max-slides at most. Its go / no-go output is high from the answer \"the same\"
+until the next `verify` begins. Exit code: 0 the same, 3 different or not sure.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -39,7 +38,6 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// Has the probe find it out.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let (mut bench, status) = Bench::open(&args.at, args.format)?;
     let bytes = bench.table()?;
@@ -54,7 +52,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
         false_alarm: args.stop.false_alarm.or(status.false_alarm),
         ..Identify::default()
     };
-    let probe = bench.probe();
+    let probe = bench.probe.clone();
     let verified = bench.done(operations::verify(&probe, texture, wanted), out)?;
     if args.format == Format::Json {
         print_json(&verified, out)?;

@@ -18,40 +18,35 @@ use crate::cmd::textures::measure_folder;
 /// Play thousands of virtual explorations and count the right answers
 #[derive(clap::Args, Clone)]
 #[command(after_help = "\
-Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the method
-choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more probable
-than --threshold, or after --max-slides.
+Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the
+method choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more
+probable than --threshold, or after --max-slides.
 
-First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none of those
-I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
-exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the known
-ones and slides are drawn with replacement, as in the paper.
+First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none
+of those I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide
+comes twice, and the exploration ends when the recordings run out. Then come the figures of explorations in which it
+must be one of the known ones and slides are drawn with replacement, as in the paper.
 
-With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
-validate, and an action is any (movement, property) pair.
+With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is
+train or validate, and an action is any (movement, property) pair.
 
-With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and tested on
-the other.
+With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and
+tested on the other.
 
---novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
-is taken for new. --lifelong plays a session in time order: the first slides are learned, and every later one is an
-episode of its own.
---verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
-does, and counts the errors: at the limits, and where both are equal.
-These need the method fused.
+--novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a
+known one is taken for new. --verify holds the slides of each texture against its own reference and against those of
+three others, as `tactus verify` does, and counts the errors: at the limits, and where both are equal. These need the
+method fused.
 
---plot draws what is told of each texture (confusion), how often it was right when it said 99 %
-(reliability). With --verify it draws one error against the other (trade-off).
+--plot draws what is told of each texture (confusion), or with --verify one error against the other (trade-off).
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
-  tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --fabrics DIR
-  tactus evaluate --recordings DIR --verify --protocol blocked
-  tactus evaluate --recordings DIR --lifelong")]
+  tactus evaluate --recordings DIR --verify --protocol blocked")]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(crate) from: Recordings,
@@ -74,16 +69,10 @@ pub(crate) struct Args {
     #[arg(long, value_enum)]
     pub(crate) features: Option<Features>,
     /// Count how textures that were not learned are noticed
-    #[arg(long, value_enum, conflicts_with_all = ["lifelong", "plot"])]
+    #[arg(long, value_enum, conflicts_with = "plot")]
     pub(crate) novelty: Option<Novelty>,
-    /// With --novelty: textures that are left out of a table together
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "novelty", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) left_out: u16,
-    /// Play a session in time order, in which the probe goes on learning
-    #[arg(long, conflicts_with = "plot")]
-    pub(crate) lifelong: bool,
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
-    #[arg(long, conflicts_with_all = ["lifelong", "novelty"])]
+    #[arg(long, conflicts_with = "novelty")]
     pub(crate) verify: bool,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
@@ -91,7 +80,7 @@ pub(crate) struct Args {
     /// Which slides to learn from and which to test on; --properties says so itself, in its column set
     #[arg(long, value_enum, default_value_t = Protocol::Interleaved)]
     pub(crate) protocol: Protocol,
-    /// Number of virtual explorations, 8000 unless given; with --lifelong of sessions, 50 unless given
+    /// Number of virtual explorations, 8000 unless given
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub(crate) runs: Option<u64>,
     #[command(flatten)]
@@ -109,20 +98,17 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Number of virtual explorations, or of sessions.
     pub(crate) fn runs(&self) -> u64 {
-        self.runs.unwrap_or(if self.lifelong { 50 } else { 8000 })
+        self.runs.unwrap_or(8000)
     }
 }
 
-/// How novelty is tried.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Novelty {
     /// One texture after the other is left out of the table, or one group after the other with --left-out
     LeaveOneOut,
 }
 
-/// What is to be evaluated, and its name.
 pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     let (experiment, name) = if let Some(folder) = &args.fabrics {
         let set = FabricSet::open(folder)?;
@@ -157,7 +143,6 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
     Ok((experiment.with_features(features), name))
 }
 
-/// What fused tables are to expect.
 pub(super) fn expected(args: &Args) -> Expected {
     Expected {
         drift: Some(args.expecting.drift),

@@ -1,4 +1,4 @@
-//! `tactus evaluate --novelty` and `--lifelong`: textures that are not in the table, and sessions that go on learning.
+//! `tactus evaluate --novelty`: textures that are not in the table.
 
 use std::io::Write;
 
@@ -7,7 +7,6 @@ use serde::Serialize;
 use tactus_core::explorer::Config;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::Experiment;
-use tactus_lab::eval::lifelong::{self, Learning, Lifelong};
 use tactus_lab::eval::novelty::{self, Novelty};
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verdicts::Verdicts;
@@ -16,28 +15,15 @@ use super::experiment::Args;
 use crate::cmd::output::{Format, print_json, verdict_rows};
 use crate::cmd::progress::with_progress;
 
-/// What `evaluate --novelty` prints.
 #[derive(Serialize)]
 struct NoveltyFigures {
     method: Method,
     protocol: &'static str,
     train_slides: usize,
-    /// Textures that were left out of a table together.
-    left_out: u16,
     runs: u64,
     seed: u64,
     #[serde(flatten)]
     novelty: Novelty,
-}
-
-/// What `evaluate --lifelong` prints.
-#[derive(Serialize)]
-struct LifelongFigures {
-    method: Method,
-    train_slides: usize,
-    sessions: u64,
-    seed: u64,
-    lifelong: Vec<Lifelong>,
 }
 
 /// Leaves every texture out of the table in turn.
@@ -48,16 +34,13 @@ pub(crate) fn leave_one_out(
     config: Config,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
-    let together = usize::from(args.left_out);
-    // a texture that is known is presented while others are left out, and limits take three
-    let least = (2 * together).max(3 + together);
+    // a texture that is known is presented while another is left out, and limits take three
     ensure!(
-        experiment.names().len() >= least,
-        "--novelty needs {} or more to leave out {together}: record more of them",
-        count(least as u64, "texture")
+        experiment.names().len() >= 4,
+        "--novelty needs 4 textures or more: record more of them"
     );
     let novelty = with_progress(args.runs(), "presenting new textures", |done| {
-        novelty::leave_out(experiment, config, together, args.runs(), done)
+        novelty::leave_one_out(experiment, config, args.runs(), done)
     })?;
     let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
     if args.format == Format::Json {
@@ -65,20 +48,15 @@ pub(crate) fn leave_one_out(
             method: args.method,
             protocol,
             train_slides,
-            left_out: args.left_out,
             runs,
             seed,
             novelty,
         };
         return print_json(&figures, out);
     }
-    let who = match together {
-        1 => "Every texture left out in turn".to_owned(),
-        n => format!("{} left out together, in turn", count(n as u64, "texture")),
-    };
     writeln!(
         out,
-        "{who}, {protocol}, {}, {}, seed {seed}",
+        "Every texture left out in turn, {protocol}, {}, {}, seed {seed}",
         count(train_slides as u64, "training slide"),
         count(runs, "run")
     )?;
@@ -107,69 +85,6 @@ pub(crate) fn leave_one_out(
     Ok(())
 }
 
-/// Plays sessions in which the probe goes on learning.
-pub(crate) fn lifelong(
-    args: &Args,
-    experiment: &Experiment,
-    config: Config,
-    out: &mut impl Write,
-) -> anyhow::Result<()> {
-    // they differ in the order of the textures only
-    let sessions = args.runs();
-    let (train_slides, seed) = (experiment.train_slides(), args.seed);
-    let lifelong = with_progress(3 * sessions, "living through sessions", |done| {
-        lifelong::lifelong(experiment, config, sessions, seed, done)
-    })?;
-    print_lives(args, train_slides, lifelong, out)
-}
-
-fn print_lives(
-    args: &Args,
-    train_slides: usize,
-    lifelong: Vec<Lifelong>,
-    out: &mut impl Write,
-) -> anyhow::Result<()> {
-    let (sessions, seed) = (args.runs(), args.seed);
-    if args.format == Format::Json {
-        let figures = LifelongFigures {
-            method: args.method,
-            train_slides,
-            sessions,
-            seed,
-            lifelong,
-        };
-        return print_json(&figures, out);
-    }
-    writeln!(
-        out,
-        "A session in time order: {} to learn from, then episodes of one slide; {} of the textures, seed {seed}",
-        count(train_slides as u64, "slide"),
-        count(sessions, "order")
-    )?;
-    for life in lifelong {
-        let who = life.learning.words();
-        let uncertain = match life.learning {
-            Learning::None | Learning::Itself => "uncertain",
-            Learning::Asking => "asked",
-        };
-        let shares = [
-            life.accuracy,
-            life.worst.0,
-            life.uncertain,
-            life.wrong_updates,
-        ];
-        let [right, worst, unsure, wrong] = shares.map(|share| share * 100.0);
-        writeln!(
-            out,
-            "  {who:<22}  right at first {right:5.1} %, worst {worst:5.1} % ({}), {uncertain} {unsure:4.1} %, wrong updates {wrong:.2} %",
-            life.worst.1
-        )?;
-        writeln!(out, "    the user is told: {}", in_words(&life.verdicts))?;
-    }
-    Ok(())
-}
-
-/// Verdicts on one line.
 fn in_words(verdicts: &Verdicts) -> String {
     let words = verdict_rows(verdicts);
     let words = words.map(|(name, share, remark)| format!("{name} {:.1} %{remark}", share * 100.0));

@@ -16,7 +16,6 @@ use crate::cmd::output::{Format, print_json};
 use crate::cmd::plot::Canvas;
 use crate::cmd::progress::with_progress;
 
-/// What `evaluate --verify` prints.
 #[derive(Serialize)]
 struct Figures {
     method: Method,
@@ -28,7 +27,6 @@ struct Figures {
     verified: Verified,
 }
 
-/// Holds every texture against references.
 pub(super) fn run(
     args: &Args,
     experiment: &Experiment,
@@ -58,7 +56,7 @@ pub(super) fn run(
     }
     if let Some(canvas) = canvas {
         let figure = trade_off::figure(&figures.verified.verify)?;
-        canvas.write("tactus evaluate --verify", &[figure], out)?;
+        canvas.write(&[figure], out)?;
     }
     Ok(())
 }

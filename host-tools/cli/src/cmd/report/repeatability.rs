@@ -16,7 +16,6 @@ use crate::cmd::output::{Format, UsageError, percent, print_json};
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
 
-/// The object that `report --format json` prints of recordings alone.
 #[derive(Serialize)]
 struct Gauged {
     parts: usize,
@@ -25,7 +24,6 @@ struct Gauged {
     movements: Vec<AtMovement>,
 }
 
-/// What slides of one movement come to.
 #[derive(Serialize)]
 struct AtMovement {
     force_n: f32,
@@ -35,7 +33,6 @@ struct AtMovement {
     properties: Vec<Gauge>,
 }
 
-/// What one property comes to.
 #[derive(Serialize)]
 struct Gauge {
     property: &'static str,
@@ -48,7 +45,6 @@ struct Gauge {
     readings: Vec<Reading>,
 }
 
-/// A slide of one of the folders.
 struct Taken {
     movement: Movement,
     part: String,
@@ -57,7 +53,6 @@ struct Taken {
     values: [Option<f32>; 3],
 }
 
-/// Prints the variances of the slides in `folders`, and draws control charts.
 pub(super) fn run(
     folders: &[PathBuf],
     plot: &Plot,
@@ -82,12 +77,11 @@ pub(super) fn run(
         Format::Text => print(&gauged, out)?,
     }
     if let Some(canvas) = canvas {
-        canvas.write("Control charts", &charts(&gauged)?, out)?;
+        canvas.write(&charts(&gauged)?, out)?;
     }
     Ok(())
 }
 
-/// Draws a control chart for each property at each movement.
 fn charts(gauged: &Gauged) -> Result<Vec<Figure>, DrawError> {
     let mut figures = Vec::new();
     for (at, movement) in (1..).zip(&gauged.movements) {

@@ -9,15 +9,14 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::rig::Fault as Named;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::PressureSensor as _;
-use tactus_core::sensor::biotac::BioTac;
+use tactus_core::sensor::biotac;
 use tactus_core::wire::{Command, Event, Identify, Phase, Report};
 use tactus_lab::sim::fault_case::naming;
 use tactus_lab::sim::fault_case::{
     Activity, Case, HOMINGS, LIFTED_N, Outcome, SHARE, STANDS_MM_S, STILL_MM, STILL_MS,
     frees_the_finger, world,
 };
-use tactus_lab::sim::press::FORCE_LIMIT_N;
+use tactus_lab::sim::rig::FORCE_LIMIT_N;
 use tactus_link::Request;
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;
@@ -520,7 +519,7 @@ fn repair(talk: &mut Talk, ear: &Ear) -> Result<(), TalkError> {
     }
     // a sensor that is plugged in again starts up
     talk.board()
-        .run_ms(u64::from(BioTac::POWER_UP_MS) + 100)
+        .run_ms(u64::from(biotac::PARTS.power_up_ms) + 100)
         .map_err(Into::into)
 }
 

@@ -15,7 +15,6 @@
 //! logarithms of the eight band powers by 0.01 to 0.04 and that of 33 to 53 Hz by 0.12; slides over one texture differ
 //! by 0.16, 0.07 and 0.2.
 
-/// Choices of signs that are kept at each sample.
 const SURVIVORS: usize = 64;
 /// Coefficients of the predictor in each turn; at most 64, the signs of as many samples are one word.
 const ORDERS: [usize; 6] = [4, 8, 16, 24, 24, 24];
@@ -23,7 +22,7 @@ const ORDERS: [usize; 6] = [4, 8, 16, 24, 24, 24];
 const SMOOTH: [f64; 2] = [1.7, -0.7];
 
 /// The samples of which `magnitudes` are the absolute values. A slide of 6 s takes about half a second and 10 MB.
-pub fn rebuild(magnitudes: &[u16]) -> Vec<i16> {
+pub(crate) fn rebuild(magnitudes: &[u16]) -> Vec<i16> {
     let magnitudes: Vec<f64> = magnitudes.iter().map(|m| f64::from(*m)).collect();
     let mut signal = best_signs(&magnitudes, &SMOOTH);
     for order in ORDERS {
@@ -36,14 +35,11 @@ pub fn rebuild(magnitudes: &[u16]) -> Vec<i16> {
     signal.iter().map(|x| (x * first) as i16).collect()
 }
 
-/// One choice of signs up to some sample.
 #[derive(Clone, Copy)]
 struct Survivor {
     /// signs of the last samples that matter, 1 = negative, the newest in the lowest bit
     signs: u64,
-    /// sum of squared errors of prediction
     cost: f64,
-    /// its last step in the list of steps
     step: u32,
 }
 

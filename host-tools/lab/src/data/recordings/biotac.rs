@@ -5,24 +5,23 @@
 //! and rate of each field of a record, in its order; `pac`, `pdc` and `f_tangential` are used), `motion.speed_mm_s`,
 //! `steady_window_s`, and per file its name, material, sizes and hashes. Nothing is assumed about the numbers of
 //! materials, slides or samples.
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use tactus_core::features::Movement;
 
 use super::files::{
-    BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, Place, RecordingError, Result, distinct_textures,
-    in_order_of_time, unpack,
+    BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, RecordingError, Result, distinct_textures,
+    in_order_of_time, read_bounded, read_named, unpack,
 };
 use super::npy::{self, MAX_SAMPLES};
-use crate::data::content::ContentError;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
 
 /// The pressing force is not in the manifest: the arm pressed with about 0.8 N, which fell to 0.3 N over the slide.
-pub const NOMINAL_FORCE_MN: u16 = 800;
+pub(crate) const NOMINAL_FORCE_MN: u16 = 800;
 /// Background power in counts^2: the records start with the finger in motion, and the golden roughness subtracts this
 /// value.
-pub const BACKGROUND_POWER: f32 = 2.2;
+pub(crate) const BACKGROUND_POWER: f32 = 2.2;
 
 /// Most bytes of samples of one material: it is read into memory as a whole.
 const MAX_RAW: u64 = 1 << 30;
@@ -39,7 +38,6 @@ pub struct Manifest {
     files: Vec<Entry>,
 }
 
-/// Places of the fields in a record.
 #[derive(Debug)]
 struct Record {
     values: usize,
@@ -90,64 +88,68 @@ struct Entry {
 
 impl Manifest {
     /// Reads and checks a manifest.
-    ///
-    /// # Errors
-    /// If it cannot be read, is no such manifest, or contradicts itself.
-    pub fn read(place: &Place) -> Result<Self> {
-        let path = &place.folder().join(MANIFEST);
-        let fault = |place: &str, cause| RecordingError::Entry {
-            path: path.to_owned(),
-            place: place.to_owned(),
-            cause,
-        };
-        let bytes = place.read(MANIFEST, MANIFEST, MAX_MANIFEST)?;
+    /// Errors: if it cannot be read, is no such manifest, or contradicts itself.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = &folder.join(MANIFEST);
+        let fault =
+            |place: &str, cause: String| RecordingError::at(path, format!("{place}: {cause}"));
+        let bytes = read_bounded(path, MAX_MANIFEST)?;
         let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
             let place = format!("line {}, column {}", e.line(), e.column());
             let json: serde_json::Value = serde_json::from_slice(&bytes).unwrap_or_default();
             let title = json["title"].as_str().unwrap_or_default();
             // the other recordings that this program knows have a manifest of the same name
             if title.starts_with("FabricSlide") {
-                return fault("title", ContentError::Fabrics);
+                let why = "this is FabricSlide, slides of another finger without P_AC: `tactus evaluate --fabrics DIR` plays it";
+                return fault("title", why.to_owned());
             }
-            fault(&place, ContentError::Json(e, "data/biotac"))
+            fault(&place, format!("{e}; the layout is that of data/biotac"))
         })?;
         let movement =
             Movement::from_si(f32::from(NOMINAL_FORCE_MN) * 1e-3, json.motion.speed_mm_s)
-                .map_err(|e| fault("motion.speed_mm_s", e.into()))?;
+                .map_err(|e| fault("motion.speed_mm_s", e.to_string()))?;
         let record = Record::of(&json.record).map_err(|cause| fault("record", cause))?;
 
         let textures: Vec<Texture> = json.files.iter().map(Entry::texture).collect();
         distinct_textures(path, &textures)?;
         if textures.is_empty() {
-            return Err(fault("files", ContentError::NoMaterial));
+            return Err(fault("files", "no material is listed".to_owned()));
         }
         for entry in &json.files {
             if entry.n_slides == 0 || json.slides.is_empty() {
-                return Err(RecordingError::EmptyTexture {
-                    manifest: path.to_owned(),
-                    id: entry.material,
-                    name: entry.name.clone(),
-                });
+                return Err(RecordingError::empty_texture(path, &entry.texture()));
             }
             let place = format!("files, {}", entry.file);
             let listed = json.slides.len();
             if entry.n_slides != listed {
-                let cause = ContentError::SlidesDisagree(entry.n_slides, listed);
+                let slides = entry.n_slides;
+                let cause =
+                    format!("n_slides is {slides}, but \"slides\" lists {listed}; they must agree");
                 return Err(fault(&place, cause));
             }
             let bytes = (entry.n_slides * 2).checked_mul(record.values);
             if bytes.is_none_or(|n| n as u64 != entry.bytes_raw) {
                 let (slides, values) = (entry.n_slides, record.values);
-                let cause = ContentError::LengthDisagrees(entry.bytes_raw, slides, values);
+                let cause = format!(
+                    "bytes_raw is {}, but slides ({slides}) of {values} 16-bit values are not that many bytes; they must \
+                     agree",
+                    entry.bytes_raw
+                );
                 return Err(fault(&place, cause));
             }
             if entry.bytes_raw > MAX_RAW {
-                let cause = ContentError::LongMaterial(entry.bytes_raw, MAX_RAW);
+                let cause = format!(
+                    "bytes_raw is {}, more than the {MAX_RAW} bytes one material can have; split it",
+                    entry.bytes_raw
+                );
                 return Err(fault(&place, cause));
             }
             // twice the raw size is more than gzip ever needs
             if entry.bytes_gz > entry.bytes_raw.saturating_mul(2) + 4096 {
-                let cause = ContentError::LongPacked(entry.bytes_gz, entry.bytes_raw);
+                let cause = format!(
+                    "bytes_gz is {}, far more than the {} bytes that are in it; correct the manifest",
+                    entry.bytes_gz, entry.bytes_raw
+                );
                 return Err(fault(&place, cause));
             }
         }
@@ -169,7 +171,6 @@ impl Manifest {
         })
     }
 
-    /// The textures, and the slides of each.
     pub(super) fn contents(&self) -> (Vec<Texture>, Vec<Vec<SlideKey>>) {
         let key = |&(number, _): &(u32, usize)| SlideKey {
             number,
@@ -183,10 +184,9 @@ impl Manifest {
         )
     }
 
-    /// Reads all slides of one texture.
-    pub(super) fn load(&self, place: &Place, texture: usize) -> Result<Vec<Recording>> {
+    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
         let entry = &self.files[texture];
-        let values = entry.values(place)?;
+        let values = entry.values(folder)?;
         let records: Vec<&[i16]> = values.chunks_exact(self.record.values).collect();
         self.slides
             .iter()
@@ -210,10 +210,9 @@ impl Manifest {
                     shear_rate_hz: shear.unwrap_or(pdc).rate_hz,
                 };
                 let slide = slide.cut(&[], field(pac), shear.map(field));
-                slide.map_err(|cause| RecordingError::Entry {
-                    path: self.path.clone(),
-                    place: format!("slide {number} of {}", entry.file),
-                    cause,
+                slide.map_err(|cause| {
+                    let cause = format!("slide {number} of {}: {cause}", entry.file);
+                    RecordingError::at(&self.path, cause)
                 })
             })
             .collect()
@@ -221,7 +220,7 @@ impl Manifest {
 }
 
 impl Record {
-    fn of(fields: &[Field]) -> std::result::Result<Self, ContentError> {
+    fn of(fields: &[Field]) -> std::result::Result<Self, String> {
         let mut start = 0;
         let (mut pac, mut pdc, mut shear) = (None, None, None);
         for field in fields {
@@ -231,7 +230,9 @@ impl Record {
                 rate_hz,
             } = *field;
             if count == 0 || count > MAX_SAMPLES {
-                return Err(ContentError::FieldLength(name.clone(), count));
+                return Err(format!(
+                    "{name} with {count} values; a slide has 1 to {MAX_SAMPLES}"
+                ));
             }
             let span = Some(Span {
                 start,
@@ -245,19 +246,22 @@ impl Record {
                 _ => &mut None,
             };
             if slot.is_some() {
-                return Err(ContentError::Twice(name.clone()));
+                return Err(format!("{name} is listed twice"));
             }
             *slot = span;
             start += count;
         }
-        let pac = pac.ok_or(ContentError::NoField("pac"))?;
+        let pac = pac.ok_or("there is no pac in it")?;
         if pac.rate_hz != PAC_RATE_HZ {
-            return Err(ContentError::PacFieldRate(pac.rate_hz));
+            return Err(format!(
+                "pac at {} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz",
+                pac.rate_hz
+            ));
         }
         Ok(Self {
             values: start,
             pac,
-            pdc: pdc.ok_or(ContentError::NoField("pdc"))?,
+            pdc: pdc.ok_or("there is no pdc in it")?,
             shear,
         })
     }
@@ -272,14 +276,16 @@ impl Entry {
     }
 
     /// All values of the file, hashes checked before and after decompression.
-    fn values(&self, place: &Place) -> Result<Vec<i16>> {
-        let packed = place.read(MANIFEST, &self.file, self.bytes_gz)?;
-        let path = place.folder().join(&self.file);
+    fn values(&self, folder: &Path) -> Result<Vec<i16>> {
+        let packed = read_named(folder, MANIFEST, &self.file, self.bytes_gz)?;
+        let path = folder.join(&self.file);
         if (packed.len() as u64) < self.bytes_gz {
-            return Err(RecordingError::Samples {
-                path,
-                cause: ContentError::Truncated(packed.len(), self.bytes_gz),
-            });
+            let cause = format!(
+                "truncated: {} bytes, the manifest says {}; fetch it again",
+                packed.len(),
+                self.bytes_gz
+            );
+            return Err(RecordingError::at(&path, cause));
         }
         let raw = unpack(
             &path,

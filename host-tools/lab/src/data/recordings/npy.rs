@@ -1,34 +1,9 @@
 //! One stream of 16-bit samples as a `.npy` file, which numpy opens in one line (`numpy.load`).
 
 /// Longest stream that is read, in samples: half an hour of P_AC. A slide lasts 15 s at most.
-pub const MAX_SAMPLES: usize = 1 << 22;
+pub(crate) const MAX_SAMPLES: usize = 1 << 22;
 /// Longest file that [`read`] can be given: samples and a generous header.
 pub const MAX_BYTES: u64 = 2 * MAX_SAMPLES as u64 + 4096;
-
-/// Reasons why a file is no stream of samples, and remedies.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum NpyError {
-    /// Another format.
-    #[error("not a .npy file{FIX}")]
-    Other,
-    /// It is too short.
-    #[error("the .npy file ends within its header; fetch or record it again")]
-    Header,
-    /// Another version of the format.
-    #[error("version {0}.{1} of the .npy format is unknown{FIX}")]
-    Version(u8, u8),
-    /// Another type or shape; the header.
-    #[error("{0} in the .npy header {1}{FIX}")]
-    Array(&'static str, String),
-    /// Half a sample is left over: the bytes of all samples.
-    #[error(
-        "{0} bytes of samples are an odd number, and a sample has two; fetch or record the file again"
-    )]
-    Odd(usize),
-    /// Samples by the header, and in the file.
-    #[error("samples by the .npy header: {0}; in the file: {1}; fetch or record it again")]
-    Length(u64, usize),
-}
 
 const FIX: &str = "; save a one-dimensional array of numpy.int16 with numpy.save";
 
@@ -58,28 +33,36 @@ pub fn array(kind: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
 ///
 /// The header is compared with the one form it can have. npyz would parse it as a Python literal of any depth and size,
 /// which a damaged file can turn against us.
-///
-/// # Errors
-/// See [`NpyError`].
-pub fn read(bytes: &[u8]) -> Result<Vec<i16>, NpyError> {
-    let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or(NpyError::Other)?;
-    let (version, rest) = rest.split_at_checked(2).ok_or(NpyError::Header)?;
+pub fn read(bytes: &[u8]) -> Result<Vec<i16>, String> {
+    let rest = bytes
+        .strip_prefix(b"\x93NUMPY")
+        .ok_or_else(|| format!("not a .npy file{FIX}"))?;
+    let cut = "the .npy file ends within its header; fetch or record it again";
+    let (version, rest) = rest.split_at_checked(2).ok_or(cut)?;
     let size_bytes = match version {
         [1, 0] => 2,
         [2 | 3, 0] => 4,
-        _ => return Err(NpyError::Version(version[0], version[1])),
+        _ => {
+            let [major, minor] = [version[0], version[1]];
+            return Err(format!(
+                "version {major}.{minor} of the .npy format is unknown{FIX}"
+            ));
+        }
     };
-    let (size, rest) = rest.split_at_checked(size_bytes).ok_or(NpyError::Header)?;
+    let (size, rest) = rest.split_at_checked(size_bytes).ok_or(cut)?;
     // little-endian
     let size = size.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b));
-    let (header, data) = rest.split_at_checked(size).ok_or(NpyError::Header)?;
+    let (header, data) = rest.split_at_checked(size).ok_or(cut)?;
     let header: String = header
         .iter()
         .filter(|b| !b.is_ascii_whitespace())
         .map(|b| char::from(*b))
         .collect();
 
-    let wrong = |what| NpyError::Array(what, header.chars().take(120).collect());
+    let wrong = |what| {
+        let header: String = header.chars().take(120).collect();
+        format!("{what} in the .npy header {header}{FIX}")
+    };
     let rest = header
         .strip_prefix("{'descr':'<i2',")
         .ok_or_else(|| wrong("the type is not '<i2'"))?;
@@ -92,10 +75,16 @@ pub fn read(bytes: &[u8]) -> Result<Vec<i16>, NpyError> {
         .and_then(|number| number.parse::<u64>().ok())
         .ok_or_else(|| wrong("the shape is not one number"))?;
     if !data.len().is_multiple_of(2) {
-        return Err(NpyError::Odd(data.len()));
+        return Err(format!(
+            "{} bytes of samples are an odd number, and a sample has two; fetch or record the file again",
+            data.len()
+        ));
     }
     if shape != data.len() as u64 / 2 {
-        return Err(NpyError::Length(shape, data.len() / 2));
+        return Err(format!(
+            "samples by the .npy header: {shape}; in the file: {}; fetch or record it again",
+            data.len() / 2
+        ));
     }
     Ok(from_le_bytes(data))
 }

@@ -23,19 +23,18 @@
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is
 //! a one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows
 //! may come in any order; textures are taken in the order of their first row.
-use std::io::Cursor;
+use std::path::Path;
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
 use super::files::{
-    MAX_MANIFEST, OWN_MANIFEST as MANIFEST, Place, RecordingError, Result, check_hash,
-    distinct_textures, in_order_of_time,
+    OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
+    in_order_of_time, read_named,
 };
 use super::npy;
-use crate::data::content::ContentError;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
-use crate::data::rows::{Row, RowError, Rows};
+use crate::data::rows::{Row, Rows};
 
 /// Its columns, in the order in which they are written.
 pub const COLUMNS: [&str; 19] = [
@@ -64,7 +63,7 @@ pub const COLUMNS: [&str; 19] = [
 pub const VERSION: u32 = 1;
 
 /// Columns that follow them, and may be missing: not everybody measures, or notes, what they hold.
-pub const LABELS: [&str; 8] = [
+pub(crate) const LABELS: [&str; 8] = [
     "lot",
     "operator",
     "note",
@@ -81,7 +80,6 @@ pub struct Manifest {
     textures: Vec<(Texture, Vec<Entry>)>,
 }
 
-/// One row.
 #[derive(Debug)]
 struct Entry {
     line: u64,
@@ -104,7 +102,6 @@ enum Background {
     Still(Stream),
 }
 
-/// A file of samples.
 #[derive(Debug)]
 struct Stream {
     file: String,
@@ -113,19 +110,11 @@ struct Stream {
 
 impl Manifest {
     /// Reads and checks a manifest.
-    ///
-    /// # Errors
-    /// If it cannot be read, a row makes no sense, or two rows contradict each other.
-    pub fn read(place: &Place) -> Result<Self> {
-        let path = &place.folder().join(MANIFEST);
+    /// Errors: if it cannot be read, a row makes no sense, or two rows contradict each other.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = &folder.join(MANIFEST);
         let mut textures: Vec<(Texture, Vec<Entry>)> = Vec::new();
-        let mut rows = match place {
-            Place::Folder(_) => Rows::open(path, &COLUMNS, &LABELS)?,
-            Place::Memory(..) => {
-                let bytes = place.read(MANIFEST, MANIFEST, MAX_MANIFEST)?;
-                Rows::of(path, Box::new(Cursor::new(bytes)), &COLUMNS, &LABELS)?
-            }
-        };
+        let mut rows = Rows::open(path, &COLUMNS, &LABELS)?;
         while let Some(row) = rows.next_row()? {
             let texture = Texture {
                 id: row.parse("texture", "the number of a texture")?,
@@ -138,11 +127,8 @@ impl Manifest {
             }
         }
         if textures.is_empty() {
-            return Err(RecordingError::Entry {
-                path: path.to_owned(),
-                place: "line 1".to_owned(),
-                cause: ContentError::NoSlides,
-            });
+            let cause = "line 1: no slide is listed below the header; record some";
+            return Err(RecordingError::at(path, cause));
         }
         let names: Vec<Texture> = textures.iter().map(|(t, _)| t.clone()).collect();
         distinct_textures(path, &names)?;
@@ -158,7 +144,6 @@ impl Manifest {
         Ok(Self { textures })
     }
 
-    /// The textures, and the slides of each.
     pub(super) fn contents(&self) -> (Vec<Texture>, Vec<Vec<SlideKey>>) {
         let key = |e: &Entry| SlideKey {
             number: e.number,
@@ -171,31 +156,33 @@ impl Manifest {
             .unzip()
     }
 
-    /// Reads all slides of one texture.
-    pub(super) fn load(&self, place: &Place, texture: usize) -> Result<Vec<Recording>> {
+    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
         let (_, entries) = &self.textures[texture];
         entries
             .iter()
-            .map(|entry| entry.load(place, texture))
+            .map(|entry| entry.load(folder, texture))
             .collect()
     }
 }
 
 impl Entry {
-    fn of(row: &Row<'_>) -> std::result::Result<Self, RowError> {
+    fn of(row: &Row<'_>) -> Result<Self> {
         if !row.text("version").is_empty() {
-            let version = row.parse("version", "the number of a version")?;
+            let version: u32 = row.parse("version", "the number of a version")?;
             if version != VERSION {
-                let cause = ContentError::Version(version);
+                let cause = format!(
+                    "version {version}, and this program reads version {VERSION}: write the recordings anew, or use the \
+                     program that wrote them"
+                );
                 return Err(row.error(Some("version"), cause));
             }
         }
         let rate = |column| row.parse(column, "a rate in whole Hz");
         let movement = Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
-            .map_err(|e| row.error(None, e.into()))?;
+            .map_err(|e| row.error(None, e.to_string()))?;
         let pac_rate_hz: u32 = rate("pac_rate_hz")?;
         if pac_rate_hz != PAC_RATE_HZ {
-            let cause = ContentError::PacRate(pac_rate_hz);
+            let cause = format!("{pac_rate_hz} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz");
             return Err(row.error(Some("pac_rate_hz"), cause));
         }
         let still = Stream::of(row, "background_file", "background_sha256")?;
@@ -203,12 +190,12 @@ impl Entry {
             ("", Some(still)) => Background::Still(still),
             (_, None) => Background::Power(row.number("background_power")?),
             (_, Some(_)) => {
-                return Err(row.error(Some("background_power"), ContentError::TwoBackgrounds));
+                let why = "there is a background_file too; leave one of them empty";
+                return Err(row.error(Some("background_power"), why));
             }
         };
         let needed = |file, sha256| {
-            Stream::of(row, file, sha256)?
-                .ok_or_else(|| row.error(Some(file), ContentError::NoFile))
+            Stream::of(row, file, sha256)?.ok_or_else(|| row.error(Some(file), "no file is named"))
         };
         let [lot, operator, note, moved, finger, calibrated, pace, _] =
             LABELS.map(|column| row.text(column).to_owned());
@@ -217,8 +204,8 @@ impl Entry {
             "yes" => Some(true),
             "no" => Some(false),
             other => {
-                let other = other.chars().take(40).collect();
-                let cause = ContentError::NotA(other, "yes, no or nothing");
+                let other: String = other.chars().take(40).collect();
+                let cause = format!("{other:?} is not yes, no or nothing");
                 return Err(row.error(Some("moved"), cause));
             }
         };
@@ -254,13 +241,13 @@ impl Entry {
         })
     }
 
-    fn load(&self, place: &Place, texture: usize) -> Result<Recording> {
-        let pac = self.pac.load(place)?;
-        let pdc = self.pdc.load(place)?;
-        let shear = self.shear.as_ref().map(|s| s.load(place)).transpose()?;
+    fn load(&self, folder: &Path, texture: usize) -> Result<Recording> {
+        let pac = self.pac.load(folder)?;
+        let pdc = self.pdc.load(folder)?;
+        let shear = self.shear.as_ref().map(|s| s.load(folder)).transpose()?;
         let (background, still) = match &self.background {
             Background::Power(power) => (Some(*power), Vec::new()),
-            Background::Still(still) => (None, still.load(place)?),
+            Background::Still(still) => (None, still.load(folder)?),
         };
         let slide = Recording {
             texture,
@@ -276,25 +263,20 @@ impl Entry {
             shear_rate_hz: self.shear_rate_hz,
         };
         let slide = slide.cut(&still, &pac, shear.as_deref());
-        slide.map_err(|cause| RecordingError::Entry {
-            path: place.folder().join(MANIFEST),
-            place: format!("line {}, {}", self.line, self.pac.file),
-            cause,
+        slide.map_err(|cause| {
+            let cause = format!("line {}, {}: {cause}", self.line, self.pac.file);
+            RecordingError::at(&folder.join(MANIFEST), cause)
         })
     }
 }
 
 impl Stream {
     /// The file and hash in two columns, if a file is named.
-    fn of(
-        row: &Row<'_>,
-        file: &'static str,
-        sha256: &'static str,
-    ) -> std::result::Result<Option<Self>, RowError> {
+    fn of(row: &Row<'_>, file: &'static str, sha256: &'static str) -> Result<Option<Self>> {
         match (row.text(file), row.text(sha256)) {
             ("", "") => Ok(None),
-            ("", _) => Err(row.error(Some(file), ContentError::HashAlone)),
-            (_, "") => Err(row.error(Some(sha256), ContentError::FileAlone)),
+            ("", _) => Err(row.error(Some(file), "a hash, but no file is named")),
+            (_, "") => Err(row.error(Some(sha256), "a file without its hash")),
             (name, hash) => Ok(Some(Self {
                 file: name.to_owned(),
                 sha256: hash.to_owned(),
@@ -302,13 +284,10 @@ impl Stream {
         }
     }
 
-    fn load(&self, place: &Place) -> Result<Vec<i16>> {
-        let bytes = place.read(MANIFEST, &self.file, npy::MAX_BYTES)?;
-        let path = place.folder().join(&self.file);
+    fn load(&self, folder: &Path) -> Result<Vec<i16>> {
+        let bytes = read_named(folder, MANIFEST, &self.file, npy::MAX_BYTES)?;
+        let path = folder.join(&self.file);
         check_hash(&path, "the file", &bytes, &self.sha256)?;
-        npy::read(&bytes).map_err(|why| RecordingError::Samples {
-            path,
-            cause: why.into(),
-        })
+        npy::read(&bytes).map_err(|why| RecordingError::at(&path, why))
     }
 }

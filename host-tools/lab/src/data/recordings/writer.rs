@@ -18,7 +18,6 @@ use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 
-/// Name of the file that becomes the manifest.
 const ROWS: &str = "manifest.csv.part";
 /// Columns of [`COLUMNS`]: texture, name, slide; and of files, each followed by or before its hash.
 const KEY: [usize; 3] = [0, 1, 2];
@@ -31,9 +30,7 @@ pub struct RecordingWriter {
     textures: Vec<Texture>,
     labels: Labels,
     rows: Vec<Vec<String>>,
-    /// texture and number of each
     keys: HashSet<(usize, u32)>,
-    /// of the rows
     journal: File,
     /// the folder was not there before
     made: bool,
@@ -42,19 +39,14 @@ pub struct RecordingWriter {
 impl RecordingWriter {
     /// Starts the recordings of `textures` in `folder`, which is made if it is not there, or continues the unfinished
     /// ones of the same `command`: [`has`](Self::has) returns the slides that are there.
-    ///
-    /// # Errors
-    /// If the folder cannot be made, or holds recordings, or unfinished ones of another command, or other files; or two
-    /// textures have one number.
+    /// Errors: if the folder cannot be made, or holds recordings, or unfinished ones of another command, or other
+    /// files; or two textures have one number.
     pub fn begin(folder: &Path, textures: Vec<Texture>, command: &str) -> Result<Self> {
         let note = note(command);
         // the last moment of a command that ended after all was whole
         if folder.join(MANIFEST).exists() && read_note(folder)? == Some(note.clone()) {
-            return Err(RecordingError::Taken {
-                folder: folder.to_owned(),
-                manifest: MANIFEST,
-            })
-            .inspect_err(|_| drop(fs::remove_file(folder.join(INCOMPLETE))));
+            drop(fs::remove_file(folder.join(INCOMPLETE)));
+            return Err(taken(folder, MANIFEST));
         }
         let made = !folder.exists();
         Self::check(folder, &textures)?;
@@ -62,9 +54,12 @@ impl RecordingWriter {
             Some(there) if there == note => rows_there(folder, &textures)?,
             // it had not come to its first slide
             Some(_) if read_rows(folder)?.lines().count() < 2 => Vec::new(),
-            Some(there) => return Err(RecordingError::Unfinished(folder.to_owned(), there)),
+            Some(there) => return Err(RecordingError::unfinished(folder, &there)),
             None if is_empty(folder)? => Vec::new(),
-            None => return Err(RecordingError::NotEmpty(folder.to_owned())),
+            None => {
+                let cause = "is not empty; give a new folder, so that nothing is mixed up";
+                return Err(RecordingError::at(folder, cause));
+            }
         };
         let keys = rows.iter().filter_map(|row| key(row, &textures)).collect();
         replace(folder, INCOMPLETE, note.as_bytes())?;
@@ -79,9 +74,8 @@ impl RecordingWriter {
         })
     }
 
-    /// The slides that are written from now on have these labels.
     #[must_use]
-    pub fn labelled(mut self, labels: Labels) -> Self {
+    pub(crate) fn labelled(mut self, labels: Labels) -> Self {
         self.label(labels);
         self
     }
@@ -96,10 +90,7 @@ impl RecordingWriter {
         fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
         for manifest in [MANIFEST, BIOTAC_MANIFEST] {
             if folder.join(manifest).exists() {
-                return Err(RecordingError::Taken {
-                    folder: folder.to_owned(),
-                    manifest,
-                });
+                return Err(taken(folder, manifest));
             }
         }
         Ok(())
@@ -116,9 +107,7 @@ impl RecordingWriter {
     }
 
     /// Leaves out the slides of a texture.
-    ///
-    /// # Errors
-    /// If the rows cannot be written again.
+    /// Errors: if the rows cannot be written again.
     pub fn forget(&mut self, texture: usize) -> Result<()> {
         self.keys.retain(|(t, _)| *t != texture);
         let (textures, keys) = (&self.textures, &self.keys);
@@ -134,30 +123,19 @@ impl RecordingWriter {
     }
 
     /// Writes the samples of one slide.
-    ///
-    /// # Errors
-    /// If the slide makes no sense, was written before, or a file cannot be written.
+    /// Errors: if the slide makes no sense, was written before, or a file cannot be written.
     pub fn write(&mut self, slide: &Recording) -> Result<()> {
         let manifest = self.folder.join(MANIFEST);
         let place = format!("slide {}", slide.number);
-        let texture = self.textures.get(slide.texture);
-        let texture = texture.ok_or_else(|| RecordingError::NoTexture {
-            folder: self.folder.clone(),
-            index: slide.texture,
-            count: self.textures.len(),
-        })?;
-        slide.check().map_err(|cause| RecordingError::Entry {
-            path: manifest.clone(),
-            place: format!("texture {}, {place}", texture.id),
-            cause,
-        })?;
+        let texture = &self.textures[slide.texture];
+        check(texture, slide, &manifest)?;
         if self.has(slide.texture, slide.number) {
-            return Err(RecordingError::DuplicateSlide {
-                manifest,
-                place,
-                id: texture.id,
-                number: slide.number,
-            });
+            return Err(RecordingError::twice(
+                &manifest,
+                &place,
+                texture.id,
+                slide.number,
+            ));
         }
 
         let folder = &self.folder;
@@ -173,18 +151,12 @@ impl RecordingWriter {
     }
 
     /// Gives the manifest its name: from here on the folder holds recordings.
-    ///
-    /// # Errors
-    /// If a texture has no slide, or the manifest cannot be written.
+    /// Errors: if a texture has no slide, or the manifest cannot be written.
     pub fn finish(self) -> Result<()> {
         let manifest = self.folder.join(MANIFEST);
         for (index, texture) in self.textures.iter().enumerate() {
             if !self.keys.iter().any(|(t, _)| *t == index) {
-                return Err(RecordingError::EmptyTexture {
-                    manifest,
-                    id: texture.id,
-                    name: texture.name.clone(),
-                });
+                return Err(RecordingError::empty_texture(&manifest, texture));
             }
         }
         self.journal
@@ -274,18 +246,12 @@ fn row(
 
 /// The files of a folder of recordings of one texture, by their names, for those who have no file system; each slide
 /// has labels.
-///
-/// # Errors
-/// A slide makes no sense.
+/// Errors: A slide makes no sense.
 pub fn files(texture: &Texture, slides: &[(Recording, Labels)]) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     let mut rows = vec![header()];
     for (slide, labels) in slides {
-        slide.check().map_err(|cause| RecordingError::Entry {
-            path: MANIFEST.into(),
-            place: format!("texture {}, slide {}", texture.id, slide.number),
-            cause,
-        })?;
+        check(texture, slide, Path::new(MANIFEST))?;
         rows.push(row(texture, slide, labels, |file, bytes| {
             files.push((file.to_owned(), bytes.to_vec()));
             Ok(())
@@ -319,7 +285,6 @@ fn is_empty(folder: &Path) -> Result<bool> {
     Ok(names.all(|entry| entry.is_ok_and(|entry| entry.file_name() == PART)))
 }
 
-/// The columns, as they are written.
 fn header() -> Vec<String> {
     let columns = COLUMNS.into_iter().chain(LABELS);
     columns.map(str::to_owned).collect()
@@ -396,7 +361,6 @@ fn csv<'r>(rows: impl Iterator<Item = &'r Vec<String>>) -> std::io::Result<Vec<u
     csv.into_inner().map_err(|e| e.into_error())
 }
 
-/// A file while it is written.
 const PART: &str = "INCOMPLETE.part";
 
 /// Writes a file of the folder, whole or not at all.
@@ -407,14 +371,23 @@ fn replace(folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
         .map_err(|e| io_error(&path, e))
 }
 
-/// A value in thousandths as a decimal number.
 fn thousandths(value: u32) -> String {
     format!("{}.{:03}", value / 1000, value % 1000)
 }
 
 fn io_error(path: &Path, cause: std::io::Error) -> RecordingError {
-    RecordingError::Io {
-        path: path.to_owned(),
-        cause,
-    }
+    RecordingError::at(path, cause)
+}
+
+fn taken(folder: &Path, manifest: &str) -> RecordingError {
+    let cause =
+        format!("already holds recordings ({manifest}); give a new folder, or remove these first");
+    RecordingError::at(folder, cause)
+}
+
+fn check(texture: &Texture, slide: &Recording, manifest: &Path) -> Result<()> {
+    slide.check().map_err(|cause| {
+        let (id, number) = (texture.id, slide.number);
+        RecordingError::at(manifest, format!("texture {id}, slide {number}: {cause}"))
+    })
 }

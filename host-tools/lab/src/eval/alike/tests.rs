@@ -2,7 +2,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{FeatureSet, Observation, Properties, PropertySet};
-use tactus_core::table::{Experience, Texture, Whitened, Whitening, encode, encode_fused};
+use tactus_core::table::{Experience, Whitened, Whitening, encode, encode_fused};
 
 use super::*;
 
@@ -99,7 +99,7 @@ fn gaussians(pair: &Pair, trials: [u8; 2], random: &mut ChaCha8Rng) -> (Vec<u8>,
         .collect();
     let mut bytes = vec![0; 1 << 14];
     let textures = ["a", "b"].into_iter().zip(&learned);
-    let textures = textures.map(|(name, experience)| Texture { name, experience });
+    let textures = textures.map(|(name, known)| (name, &known[..]));
     let table = encode(&mut bytes, PropertySet::ALL, &MOVEMENTS, textures).unwrap();
     let length = table.as_bytes().len();
     (bytes, length)
@@ -131,7 +131,7 @@ type Learn = fn(&Pair, [u8; 2], &mut ChaCha8Rng) -> (Vec<u8>, usize);
 /// Mean of the computed share, and the share of slides that the explorer takes for the other's, over many tables of
 /// pairs so far apart, at the movement that is computed to be the best.
 fn said_and_seen(learn: Learn, features: usize, apart: [f64; 3], trials: [u8; 2]) -> (f64, f64) {
-    const TABLES: u64 = 200;
+    const TABLES: u64 = 80;
     const SLIDES: u32 = 20;
     let (mut said, mut taken) = (0.0, 0);
     for seed in 0..TABLES {

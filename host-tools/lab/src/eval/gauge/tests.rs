@@ -145,9 +145,9 @@ fn what_cannot_be_compared_is_told() {
         .into_iter()
         .filter(|r| r.part == "part 1")
         .collect();
-    assert_eq!(study(&one), Err(GaugeError::OnePart));
+    assert_eq!(study(&one), Err(ONE_PART));
     let once: Vec<Reading> = published().into_iter().filter(|r| r.slide == 0).collect();
-    assert_eq!(study(&once), Err(GaugeError::NoRepetition));
+    assert_eq!(study(&once), Err(NO_REPETITION));
     let same = (0..6)
         .map(|n| reading(n / 3, "A", n, 1.0))
         .collect::<Vec<_>>();

@@ -13,9 +13,6 @@ use super::{SimError, SimRig, TICK_NS};
 
 impl SimRig {
     /// Measures this rig's motor current without load, and takes it into the calibration.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn calibrate_current(&mut self) -> Result<RigCalibration, SimError> {
         let mut runs = UnloadedRuns::default();
         while let Some(speed_um_s) = runs.next_speed() {
@@ -36,9 +33,7 @@ impl SimRig {
     }
 
     /// The sensor's serial number, asked for between two slots; the name of a finger that has none.
-    ///
-    /// # Errors
-    /// It is not that of a BioTac.
+    /// Errors: it is not that of a BioTac.
     pub fn serial(&mut self) -> Result<[u8; 16], SimError> {
         let name = self.reader.model().name;
         if name != FingerName::Biotac {
@@ -71,9 +66,6 @@ impl SimRig {
 
     /// Measures everything that differs from rig to rig: the motor current without load, newtons per ampere on the
     /// inclined stage, P_DC in the air, and its counts per newton on a force plate. `date` as 20261121.
-    ///
-    /// # Errors
-    /// See [`SimError`].
     pub fn calibrate(&mut self, date: u32) -> Result<RigCalibration, SimError> {
         let serial = self.serial()?;
         let unloaded = self.calibrate_current()?;

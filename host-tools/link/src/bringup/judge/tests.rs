@@ -286,734 +286,191 @@ fn slid_with(change: impl Fn(&mut SlideReport)) -> Finding {
     slid(|seen| seen.observed.iter_mut().for_each(&change))
 }
 
-const CASES: &[Case] = &[
-    ("supplies, low end", || supplies(3.21, 11.41), &[]),
-    ("supplies, high end", || supplies(3.39, 12.59), &[]),
-    ("3.3 V low", || supplies(3.19, 12.0), &[("supply", "3.3 V")]),
-    (
-        "3.3 V high",
-        || supplies(3.41, 12.0),
-        &[("supply", "3.3 V")],
-    ),
-    (
-        "12 V low",
-        || supplies(3.3, 11.39),
-        &[("supply", "12 V of the motors")],
-    ),
-    (
-        "12 V high",
-        || supplies(3.3, 12.61),
-        &[("supply", "12 V of the motors")],
-    ),
-    ("a sound chip", || reset_by(None), &[]),
-    (
-        "16 kHz off",
-        || {
-            chip_of(ChipSeen {
-                khz: 168_016,
-                ..CHIP
-            })
-        },
-        &[],
-    ),
-    (
-        "17 kHz off",
-        || {
-            chip_of(ChipSeen {
-                khz: 167_983,
-                ..CHIP
-            })
-        },
-        &[("clock", "")],
-    ),
-    (
-        "its own clock",
-        || {
-            chip_of(ChipSeen {
-                external: false,
-                ..CHIP
-            })
-        },
-        &[("clock", "")],
-    ),
-    (
-        "no PLL",
-        || {
-            chip_of(ChipSeen {
-                locked: false,
-                ..CHIP
-            })
-        },
-        &[("clock", "")],
-    ),
-    ("last words", || reset_by(Some("stack")), &[("reset", "")]),
-    (
-        "PA12 high",
-        || chip_of(ChipSeen { pa12: true, ..CHIP }),
-        &[("pa12", "")],
-    ),
-    (
-        "as delivered",
-        || {
-            chip_of(ChipSeen {
-                brown_out: 3,
-                ..CHIP
-            })
-        },
-        &[("brown-out", "")],
-    ),
-    (
-        "level 2",
-        || {
-            chip_of(ChipSeen {
-                brown_out: 1,
-                ..CHIP
-            })
-        },
-        &[("brown-out", "")],
-    ),
-    ("sound pins", || pins_but(&[]), &[]),
-    (
-        "a stage on its switch",
-        || pins_but(&[(Pin::StageLeft, Tied::Floating)]),
-        &[],
-    ),
-    (
-        "switches tied high",
-        || {
-            pins_but(&[
-                (Pin::LeverTop, Tied::High),
-                (Pin::StageLeft, Tied::High),
-                (Pin::StageRight, Tied::High),
-                (Pin::EStop, Tied::High),
-            ])
-        },
-        &[
-            ("tied-high", "the lever's switch PF12"),
-            ("tied-high", "the left switch PF14"),
-            ("tied-high", "the right switch PF15"),
-            ("tied-high", "the emergency stop PF13"),
-        ],
-    ),
-    (
-        "no encoder",
-        || {
-            pins_but(&[
-                (Pin::EncoderA, Tied::Floating),
-                (Pin::EncoderB, Tied::Floating),
-            ])
-        },
-        &[("encoder-silent", "PD12 and PD13")],
-    ),
-    (
-        "A open",
-        || pins_but(&[(Pin::EncoderA, Tied::Floating)]),
-        &[("encoder-line", "the encoder's A PD12")],
-    ),
-    (
-        "B open",
-        || pins_but(&[(Pin::EncoderB, Tied::Floating)]),
-        &[("encoder-line", "the encoder's B PD13")],
-    ),
-    (
-        "MISO and MOSI exchanged",
-        || pins_but(&[(Pin::Miso, Tied::Floating), (Pin::Mosi, Tied::High)]),
-        &[("data-exchanged", "PA6 and PB5")],
-    ),
-    // that is the sensor's step to name
-    (
-        "no sensor",
-        || pins_but(&[(Pin::Miso, Tied::Floating)]),
-        &[],
-    ),
-    (
-        "no resistors",
-        || {
-            pins_but(&[
-                (Pin::Select, Tied::Floating),
-                (Pin::LeverEnable, Tied::Floating),
-                (Pin::StageEnable, Tied::High),
-            ])
-        },
-        &[
-            ("pull-missing", "chip select PD14"),
-            ("pull-missing", "the lever's EN PE13"),
-            ("pull-missing", "the bridge's EN PC8"),
-        ],
-    ),
-    ("a sound sensor", || sensor_but(|_| ()), &[]),
-    (
-        "a garbled word",
-        || sensor_but(|seen| seen.garbled = 1),
-        &[("words", "")],
-    ),
-    (
-        "an error frame",
-        || sensor_but(|seen| seen.error_frames = 1),
-        &[("words", "")],
-    ),
-    (
-        "a late slot",
-        || sensor_but(|seen| seen.late = 1),
-        &[("words", "")],
-    ),
-    (
-        "some silence",
-        || sensor_but(|seen| seen.silent = 2200),
-        &[("words", "")],
-    ),
-    (
-        "no identity",
-        || sensor_but(|seen| seen.identity = Err("no answer".try_into().unwrap())),
-        &[("words", "")],
-    ),
-    (
-        "silence of FF",
-        || {
-            sensor_but(|seen| {
-                (seen.silent, seen.last) = (2201, [0xFF; 2]);
-            })
-        },
-        &[("sensor-silent", "")],
-    ),
-    (
-        "silence of 00",
-        || {
-            sensor_but(|seen| {
-                (seen.silent, seen.last) = (4400, [0; 2]);
-            })
-        },
-        &[("miso-stuck", "low")],
-    ),
-    ("quiet enough", || noise_of(1.01, 2001.0), &[]),
-    ("loud enough", || noise_of(7.99, 3199.0), &[]),
-    (
-        "too quiet",
-        || noise_of(0.99, 2640.0),
-        &[("sensor-still", "")],
-    ),
-    (
-        "too loud",
-        || noise_of(8.01, 2640.0),
-        &[("sensor-noisy", "")],
-    ),
-    (
-        "leaked",
-        || noise_of(2.0, 1999.0),
-        &[("sensor-filling", "")],
-    ),
-    (
-        "overfilled",
-        || noise_of(2.0, 3201.0),
-        &[("sensor-filling", "")],
-    ),
-    (
-        "sound switches",
-        || right_switch(&[], &[Pin::StageRight]),
-        &[],
-    ),
-    (
-        "a bridged switch",
-        || right_switch(&[], &[]),
-        &[("switch-closed", "the right switch PF15")],
-    ),
-    (
-        "a switch of open wires",
-        || right_switch(&[Pin::StageRight], &[Pin::StageRight]),
-        &[("switch-open", "the right switch PF15")],
-    ),
-    (
-        "a switch that makes",
-        || right_switch(&[Pin::StageRight], &[]),
-        &[("switch-kind", "the right switch PF15")],
-    ),
-    (
-        "the left one opens instead",
-        || right_switch(&[], &[Pin::StageLeft]),
-        &[("switches-exchanged", "the left switch PF14")],
-    ),
-    (
-        "the left one opens with it",
-        || right_switch(&[], &[Pin::StageRight, Pin::StageLeft]),
-        &[("switches-joined", "the left switch PF14")],
-    ),
-    ("both contacts", || stop(true, true), &[]),
-    (
-        "no first contact",
-        || stop(false, true),
-        &[("switch-closed", "the emergency stop PF13")],
-    ),
-    (
-        "no second contact",
-        || stop(true, false),
-        &[("stop-supply", "")],
-    ),
-    ("a short travel", || sound_push(74.01), &[]),
-    ("a long travel", || sound_push(87.99), &[]),
-    ("too short", || sound_push(73.9), &[("encoder-lines", "")]),
-    ("too long", || sound_push(88.1), &[("encoder-lines", "")]),
-    (
-        "A and B exchanged",
-        || sound_push(-77.0),
-        &[("encoder-exchanged", "PD12 and PD13")],
-    ),
-    (
-        "one line counts",
-        || sound_push(0.001),
-        &[("encoder-line", "A or B")],
-    ),
-    (
-        "switches exchanged",
-        || pushed(77.0, &[Pin::StageRight], &[Pin::StageLeft]),
-        &[("switches-exchanged", "left and right")],
-    ),
-    (
-        "the left one is not reached",
-        || pushed(77.0, &[], &[Pin::StageRight]),
-        &[("switch-closed", "the left switch PF14")],
-    ),
-    (
-        "the right one is not reached",
-        || pushed(77.0, &[Pin::StageLeft], &[]),
-        &[("switch-closed", "the right switch PF15")],
-    ),
-    (
-        "an amplifier at rest",
-        || resting(Some([2107.0, 15.9])),
-        &[],
-    ),
-    (
-        "below the middle",
-        || resting(Some([1987.0, 4.0])),
-        &[("current-offset", "")],
-    ),
-    (
-        "above the middle",
-        || resting(Some([2109.0, 4.0])),
-        &[("current-offset", "")],
-    ),
-    (
-        "noise",
-        || resting(Some([2048.0, 16.1])),
-        &[("current-noise", "")],
-    ),
-    (
-        "at its end",
-        || resting(Some([4095.0, 0.0])),
-        &[("current-open", "PA3")],
-    ),
-    (
-        "floating",
-        || resting(Some([372.0, 4.0])),
-        &[("current-open", "PA3")],
-    ),
-    (
-        "no conversions",
-        || resting(None),
-        &[("current-open", "PA3")],
-    ),
-    ("squeezed", || squeezed(Ok(())), &[]),
-    (
-        "not squeezed",
-        || squeezed(Err(Stopped::NobodySqueezed)),
-        &[("finger-dead", "")],
-    ),
-    (
-        "no words meanwhile",
-        || squeezed(Err(Stopped::Silent)),
-        &[("sensor-silent", "")],
-    ),
-    (
-        "up",
-        || lever_sense(&lever(-1600, false, Ok(())), Went::There),
-        &[],
-    ),
-    (
-        "down",
-        || lever_sense(&lever(-1600, false, Ok(())), Went::Back),
-        &[("lever-dir", "")],
-    ),
-    (
-        "nowhere",
-        || lever_sense(&lever(-1600, false, Ok(())), Went::Nowhere),
-        &[("lever-still", "")],
-    ),
-    (
-        "stopped on its way",
-        || lever_sense(&lever(-400, false, Err(Stopped::EStop)), Went::There),
-        &[("stopped", "the lever")],
-    ),
-    ("0.1 mm of play", || up_down_up(Ok(()), false, 3360), &[]),
-    (
-        "more up than down",
-        || up_down_up(Ok(()), false, 3361),
-        &[("lever-steps", "")],
-    ),
-    (
-        "fewer up than down",
-        || up_down_up(Ok(()), false, 3039),
-        &[("lever-steps", "")],
-    ),
-    (
-        "open 2 mm below",
-        || up_down_up(Ok(()), true, 3200),
-        &[("switch-open", "the lever's switch PF12")],
-    ),
-    (
-        "never open",
-        || up_down_up(Err(Stopped::TopStaysClosed), false, 3200),
-        &[("switch-closed", "the lever's switch PF12")],
-    ),
-    (
-        "pressed on its way",
-        || up_down_up(Err(Stopped::Pressed), false, 3200),
-        &[("stopped", "the lever")],
-    ),
-    ("3.81 mm", || lever_scale(3.81), &[]),
-    ("4.19 mm", || lever_scale(4.19), &[]),
-    ("3.7 mm", || lever_scale(3.7), &[("lever-steps", "")]),
-    ("2.9 mm", || lever_scale(2.9), &[("lever-steps", "")]),
-    ("4.3 mm", || lever_scale(4.3), &[("lever-steps", "")]),
-    ("2 mm", || lever_scale(2.0), &[("lever-scale", "")]),
-    ("8 mm", || lever_scale(8.0), &[("lever-scale", "")]),
-    ("foam within play", || pressed_foam(6240, Ok(())), &[]),
-    (
-        "foam beyond play",
-        || pressed_foam(6239, Ok(())),
-        &[("lever-steps", "")],
-    ),
-    (
-        "foam that stops it",
-        || pressed_foam(6400, Err(Stopped::EStop)),
-        &[("stopped", "the lever")],
-    ),
-    ("a sound stage", || moved(Ok(()), Went::There), &[]),
-    (
-        "the stage at its switch",
-        || moved(Err(Stopped::Limit), Went::There),
-        &[("stopped", "the stage")],
-    ),
-    (
-        "stopped on its way back",
-        || {
-            let left = StageSeen {
-                ended: Err(Stopped::EStop),
-                ..LEFT
-            };
-            stage_sense(&RIGHT, &left, Went::There)
-        },
-        &[("stopped", "the stage")],
-    ),
-    (
-        "to the left",
-        || moved(Err(Stopped::Backwards), Went::Back),
-        &[("stage-reversed", "")],
-    ),
-    (
-        "to the left, and not back",
-        || {
-            let left = StageSeen {
-                driven_ma: 20.0,
-                moved_um: 0,
-                ..LEFT
-            };
-            stage_sense(&RIGHT, &left, Went::Back)
-        },
-        &[("bridge-exchanged", "PC6 and PC7")],
-    ),
-    (
-        "no current",
-        || {
-            let right = StageSeen {
-                driven_ma: 24.0,
-                ended: Err(Stopped::NoCurrent),
-                ..RIGHT
-            };
-            stage_sense(&right, &LEFT, Went::Nowhere)
-        },
-        &[("stage-still", "")],
-    ),
-    (
-        "current, and it stands",
-        || {
-            let right = StageSeen {
-                driven_ma: 26.0,
-                ended: Err(Stopped::NoCount),
-                ..RIGHT
-            };
-            stage_sense(&right, &LEFT, Went::Nowhere)
-        },
-        &[("stage-stuck", "")],
-    ),
-    (
-        "counts down",
-        || moved(Err(Stopped::Backwards), Went::There),
-        &[("encoder-exchanged", "PD12 and PD13")],
-    ),
-    (
-        "counts nothing",
-        || moved(Err(Stopped::NoCount), Went::There),
-        &[("encoder-line", "A or B")],
-    ),
-    (
-        "current of the other sign",
-        || {
-            stage_sense(
-                &StageSeen {
-                    driven_ma: -26.0,
-                    ..RIGHT
-                },
-                &LEFT,
-                Went::There,
-            )
-        },
-        &[("current-reversed", "")],
-    ),
-    (
-        "current of the other sign back",
-        || {
-            stage_sense(
-                &RIGHT,
-                &StageSeen {
-                    driven_ma: 26.0,
-                    ..LEFT
-                },
-                Went::There,
-            )
-        },
-        &[("current-reversed", "")],
-    ),
-    ("brakes", || braked(-20.1, 20.1), &[]),
-    (
-        "coasts to the right",
-        || braked(-19.9, 60.0),
-        &[("bridge-decay", "")],
-    ),
-    (
-        "coasts to the left",
-        || braked(-60.0, 19.9),
-        &[("bridge-decay", "")],
-    ),
-    (
-        "stopped before it could brake",
-        || {
-            bridge(
-                &StageSeen {
-                    ended: Err(Stopped::Limit),
-                    ..RIGHT
-                },
-                &LEFT,
-            )
-        },
-        &[("stopped", "the stage")],
-    ),
-    (
-        "stopped before it could brake back",
-        || {
-            bridge(
-                &RIGHT,
-                &StageSeen {
-                    ended: Err(Stopped::Limit),
-                    ..LEFT
-                },
-            )
-        },
-        &[("stopped", "the stage")],
-    ),
-    ("a gain of 0.91", || of_gain(0.91), &[]),
-    ("a gain of 1.09", || of_gain(1.09), &[]),
-    ("a gain of 0.89", || of_gain(0.89), &[("current-gain", "")]),
-    ("a gain of 1.11", || of_gain(1.11), &[("current-gain", "")]),
-    ("no gain", || of_gain(0.05), &[("stage-still", "")]),
-    (
-        "a negative gain",
-        || of_gain(-1.0),
-        &[("current-reversed", "")],
-    ),
-    (
-        "a motor in the resistor's place",
-        || resistor(Err(Stopped::Moves), &[], 12.0, 22.0),
-        &[("motor-connected", "the stage")],
-    ),
-    (
-        "an emergency stop in the ramp",
-        || resistor(Err(Stopped::EStop), &[], 12.0, 22.0),
-        &[("stopped", "the stage")],
-    ),
-    (
-        "an empty ramp",
-        || resistor(Ok(()), &[], 12.0, 22.0),
-        &[("stopped", "the ramp")],
-    ),
-    ("a store that keeps", || store(&Ok([7, 7])), &[]),
-    (
-        "a store that does not",
-        || store(&Ok([7, 0])),
-        &[("store", "")],
-    ),
-    (
-        "a store that refuses",
-        || store(&Err("full".to_owned())),
-        &[("store", "")],
-    ),
-    ("a watchdog", || watchdog(Some(Reset::Watchdog)), &[]),
-    (
-        "another start",
-        || watchdog(Some(Reset::Pin)),
-        &[("watchdog", "")],
-    ),
-    ("no start", || watchdog(None), &[("watchdog", "")]),
-    ("weights on a line", || weighed(11.5, 0.09, 7.9), &[]),
-    ("a hard finger", || weighed(22.9, 0.0, 0.0), &[]),
-    ("a soft finger", || weighed(5.8, 0.0, 0.0), &[]),
-    (
-        "a weight that leans",
-        || weighed(11.5, 0.2, 0.0),
-        &[("scale-line", "")],
-    ),
-    (
-        "weights that are heavier",
-        || weighed(23.1, 0.0, 0.0),
-        &[("scale-far", "")],
-    ),
-    (
-        "weights that are lighter",
-        || weighed(5.7, 0.0, 0.0),
-        &[("scale-far", "")],
-    ),
-    (
-        "P_DC that falls",
-        || weighed(-11.5, 0.0, 0.0),
-        &[("finger-dead", "")],
-    ),
-    (
-        "P_DC that stands",
-        || weighed(1e4, 0.0, 0.0),
-        &[("finger-dead", "")],
-    ),
-    (
-        "P_DC that falls under a weight",
-        || mounted::scale(&[[42.6, 490.0], [85.3, 981.0], [127.9, 1471.0]], -8.1, 0.0),
-        &[("finger-leaks", "")],
-    ),
-    (
-        "less P_DC afterwards",
-        || weighed(11.5, 0.0, -8.1),
-        &[("finger-leaks", "")],
-    ),
-    (
-        "more P_DC afterwards",
-        || weighed(11.5, 0.0, 8.1),
-        &[("finger-leaks", "")],
-    ),
-    (
-        "the same air",
-        || zeroed(2647.9, Some(&Ok((11.2, true)))),
-        &[],
-    ),
-    (
-        "another air",
-        || zeroed(2631.9, None),
-        &[("zero-drifts", "")],
-    ),
-    (
-        "a scale that is not kept",
-        || zeroed(2640.0, Some(&Ok((11.2, false)))),
-        &[("store", "")],
-    ),
-    (
-        "a scale that is refused",
-        || zeroed(2640.0, Some(&Err("busy".to_owned()))),
-        &[("store", "")],
-    ),
-    (
-        "a rig that does not home",
-        || mounted::zero(&Err("stage".to_owned()), &Err("stage".to_owned()), None),
-        &[("fault", "")],
-    ),
-    ("even runs", || runs([1.0; 4], 0.2), &[]),
-    (
-        "runs 1.9 % off",
-        || runs([1.019, 0.981, 1.0, 1.0], 0.0),
-        &[],
-    ),
-    (
-        "a run 2.1 % too slow",
-        || runs([1.0, 1.0, 0.979, 1.0], 0.0),
-        &[("stage-speed", "")],
-    ),
-    (
-        "a run 2.1 % too fast",
-        || runs([1.0, 1.0, 1.0, 1.021], 0.0),
-        &[("stage-speed", "")],
-    ),
-    (
-        "a run that sticks",
-        || runs([1.0; 4], 0.4),
-        &[("stage-speed", "uneven")],
-    ),
-    (
-        "no runs",
-        || mounted::speed(None, &[]),
-        &[("stage-speed", "runs")],
-    ),
-    (
-        "a run with a fault",
-        || mounted::speed(Some("jammed"), &[]),
-        &[("fault", "")],
-    ),
-    ("a sound slide", || slid(|_| ()), &[]),
-    (
-        "a late slot",
-        || slid(|seen| seen.counts.late_slots = 1),
-        &[("words", "")],
-    ),
-    (
-        "bad parity",
-        || slid(|seen| seen.counts.parity_errors = 1),
-        &[("words", "")],
-    ),
-    (
-        "an error frame",
-        || slid(|seen| seen.counts.error_frames = 1),
-        &[("words", "")],
-    ),
-    (
-        "a lost sample",
-        || slid(|seen| seen.counts.lost_samples = 1),
-        &[("samples-lost", "")],
-    ),
-    (
-        "a still slide",
-        || slid_with(|slide| slide.roughness_is_bound = true),
-        &[("slide-quiet", "")],
-    ),
-    (
-        "no roughness",
-        || slid_with(|slide| slide.properties[1] = None),
-        &[("slide-quiet", "")],
-    ),
-    (
-        "no traction",
-        || slid_with(|slide| slide.properties[0] = None),
-        &[("slide-traction", "")],
-    ),
-    (
-        "traction that pushes",
-        || slid_with(|slide| slide.properties[0] = Some(-0.1)),
-        &[("slide-traction", "")],
-    ),
-    (
-        "no slide",
-        || slid(|seen| seen.observed = None),
-        &[("fault", "")],
-    ),
-    (
-        "a slide that failed",
-        || slid(|seen| seen.failed = Some("force".to_owned())),
-        &[("fault", "")],
-    ),
-];
+macro_rules! cases {
+    ($($name:literal: $found:expr => $($key:literal $place:literal),*;)*) => {
+        const CASES: &[Case] = &[$(($name, || $found, &[$(($key, $place)),*])),*];
+    };
+}
+
+cases! {
+    "supplies, low end": supplies(3.21, 11.41) => ;
+    "supplies, high end": supplies(3.39, 12.59) => ;
+    "3.3 V low": supplies(3.19, 12.0) => "supply" "3.3 V";
+    "3.3 V high": supplies(3.41, 12.0) => "supply" "3.3 V";
+    "12 V low": supplies(3.3, 11.39) => "supply" "12 V of the motors";
+    "12 V high": supplies(3.3, 12.61) => "supply" "12 V of the motors";
+    "a sound chip": reset_by(None) => ;
+    "16 kHz off": chip_of(ChipSeen { khz: 168_016, ..CHIP }) => ;
+    "17 kHz off": chip_of(ChipSeen { khz: 167_983, ..CHIP }) => "clock" "";
+    "its own clock": chip_of(ChipSeen { external: false, ..CHIP }) => "clock" "";
+    "no PLL": chip_of(ChipSeen { locked: false, ..CHIP }) => "clock" "";
+    "last words": reset_by(Some("stack")) => "reset" "";
+    "PA12 high": chip_of(ChipSeen { pa12: true, ..CHIP }) => "pa12" "";
+    "as delivered": chip_of(ChipSeen { brown_out: 3, ..CHIP }) => "brown-out" "";
+    "level 2": chip_of(ChipSeen { brown_out: 1, ..CHIP }) => "brown-out" "";
+    "sound pins": pins_but(&[]) => ;
+    "a stage on its switch": pins_but(&[(Pin::StageLeft, Tied::Floating)]) => ;
+    "switches tied high":
+        pins_but(&[Pin::LeverTop, Pin::StageLeft, Pin::StageRight, Pin::EStop].map(|pin| (pin, Tied::High)))
+        => "tied-high" "the lever's switch PF12",
+           "tied-high" "the left switch PF14",
+           "tied-high" "the right switch PF15",
+           "tied-high" "the emergency stop PF13";
+    "no encoder": pins_but(&[(Pin::EncoderA, Tied::Floating), (Pin::EncoderB, Tied::Floating)])
+        => "encoder-silent" "PD12 and PD13";
+    "A open": pins_but(&[(Pin::EncoderA, Tied::Floating)]) => "encoder-line" "the encoder's A PD12";
+    "B open": pins_but(&[(Pin::EncoderB, Tied::Floating)]) => "encoder-line" "the encoder's B PD13";
+    "MISO and MOSI exchanged": pins_but(&[(Pin::Miso, Tied::Floating), (Pin::Mosi, Tied::High)])
+        => "data-exchanged" "PA6 and PB5";
+    "no sensor": pins_but(&[(Pin::Miso, Tied::Floating)]) => ;
+    "no resistors":
+        pins_but(&[(Pin::Select, Tied::Floating), (Pin::LeverEnable, Tied::Floating), (Pin::StageEnable, Tied::High)])
+        => "pull-missing" "chip select PD14",
+           "pull-missing" "the lever's EN PE13",
+           "pull-missing" "the bridge's EN PC8";
+    "a sound sensor": sensor_but(|_| ()) => ;
+    "a garbled word": sensor_but(|seen| seen.garbled = 1) => "words" "";
+    "an error frame": sensor_but(|seen| seen.error_frames = 1) => "words" "";
+    "a late slot": sensor_but(|seen| seen.late = 1) => "words" "";
+    "some silence": sensor_but(|seen| seen.silent = 2200) => "words" "";
+    "no identity": sensor_but(|seen| seen.identity = Err("no answer".try_into().unwrap())) => "words" "";
+    "silence of FF": sensor_but(|seen| (seen.silent, seen.last) = (2201, [0xFF; 2])) => "sensor-silent" "";
+    "silence of 00": sensor_but(|seen| (seen.silent, seen.last) = (4400, [0; 2])) => "miso-stuck" "low";
+    "quiet enough": noise_of(1.01, 2001.0) => ;
+    "loud enough": noise_of(7.99, 3199.0) => ;
+    "too quiet": noise_of(0.99, 2640.0) => "sensor-still" "";
+    "too loud": noise_of(8.01, 2640.0) => "sensor-noisy" "";
+    "leaked": noise_of(2.0, 1999.0) => "sensor-filling" "";
+    "overfilled": noise_of(2.0, 3201.0) => "sensor-filling" "";
+    "sound switches": right_switch(&[], &[Pin::StageRight]) => ;
+    "a bridged switch": right_switch(&[], &[]) => "switch-closed" "the right switch PF15";
+    "a switch of open wires": right_switch(&[Pin::StageRight], &[Pin::StageRight])
+        => "switch-open" "the right switch PF15";
+    "a switch that makes": right_switch(&[Pin::StageRight], &[]) => "switch-kind" "the right switch PF15";
+    "the left one opens instead": right_switch(&[], &[Pin::StageLeft]) => "switches-exchanged" "the left switch PF14";
+    "the left one opens with it": right_switch(&[], &[Pin::StageRight, Pin::StageLeft])
+        => "switches-joined" "the left switch PF14";
+    "both contacts": stop(true, true) => ;
+    "no first contact": stop(false, true) => "switch-closed" "the emergency stop PF13";
+    "no second contact": stop(true, false) => "stop-supply" "";
+    "a short travel": sound_push(74.01) => ;
+    "a long travel": sound_push(87.99) => ;
+    "too short": sound_push(73.9) => "encoder-lines" "";
+    "too long": sound_push(88.1) => "encoder-lines" "";
+    "A and B exchanged": sound_push(-77.0) => "encoder-exchanged" "PD12 and PD13";
+    "one line counts": sound_push(0.001) => "encoder-line" "A or B";
+    "switches exchanged": pushed(77.0, &[Pin::StageRight], &[Pin::StageLeft])
+        => "switches-exchanged" "left and right";
+    "the left one is not reached": pushed(77.0, &[], &[Pin::StageRight]) => "switch-closed" "the left switch PF14";
+    "the right one is not reached": pushed(77.0, &[Pin::StageLeft], &[]) => "switch-closed" "the right switch PF15";
+    "an amplifier at rest": resting(Some([2107.0, 15.9])) => ;
+    "below the middle": resting(Some([1987.0, 4.0])) => "current-offset" "";
+    "above the middle": resting(Some([2109.0, 4.0])) => "current-offset" "";
+    "noise": resting(Some([2048.0, 16.1])) => "current-noise" "";
+    "at its end": resting(Some([4095.0, 0.0])) => "current-open" "PA3";
+    "floating": resting(Some([372.0, 4.0])) => "current-open" "PA3";
+    "no conversions": resting(None) => "current-open" "PA3";
+    "squeezed": squeezed(Ok(())) => ;
+    "not squeezed": squeezed(Err(Stopped::NobodySqueezed)) => "finger-dead" "";
+    "no words meanwhile": squeezed(Err(Stopped::Silent)) => "sensor-silent" "";
+    "up": lever_sense(&lever(-1600, false, Ok(())), Went::There) => ;
+    "down": lever_sense(&lever(-1600, false, Ok(())), Went::Back) => "lever-dir" "";
+    "nowhere": lever_sense(&lever(-1600, false, Ok(())), Went::Nowhere) => "lever-still" "";
+    "stopped on its way": lever_sense(&lever(-400, false, Err(Stopped::EStop)), Went::There) => "stopped" "the lever";
+    "0.1 mm of play": up_down_up(Ok(()), false, 3360) => ;
+    "more up than down": up_down_up(Ok(()), false, 3361) => "lever-steps" "";
+    "fewer up than down": up_down_up(Ok(()), false, 3039) => "lever-steps" "";
+    "open 2 mm below": up_down_up(Ok(()), true, 3200) => "switch-open" "the lever's switch PF12";
+    "never open": up_down_up(Err(Stopped::TopStaysClosed), false, 3200) => "switch-closed" "the lever's switch PF12";
+    "pressed on its way": up_down_up(Err(Stopped::Pressed), false, 3200) => "stopped" "the lever";
+    "3.81 mm": lever_scale(3.81) => ;
+    "4.19 mm": lever_scale(4.19) => ;
+    "3.7 mm": lever_scale(3.7) => "lever-steps" "";
+    "2.9 mm": lever_scale(2.9) => "lever-steps" "";
+    "4.3 mm": lever_scale(4.3) => "lever-steps" "";
+    "2 mm": lever_scale(2.0) => "lever-scale" "";
+    "8 mm": lever_scale(8.0) => "lever-scale" "";
+    "foam within play": pressed_foam(6240, Ok(())) => ;
+    "foam beyond play": pressed_foam(6239, Ok(())) => "lever-steps" "";
+    "foam that stops it": pressed_foam(6400, Err(Stopped::EStop)) => "stopped" "the lever";
+    "a sound stage": moved(Ok(()), Went::There) => ;
+    "the stage at its switch": moved(Err(Stopped::Limit), Went::There) => "stopped" "the stage";
+    "stopped on its way back": stage_sense(&RIGHT, &StageSeen { ended: Err(Stopped::EStop), ..LEFT }, Went::There)
+        => "stopped" "the stage";
+    "to the left": moved(Err(Stopped::Backwards), Went::Back) => "stage-reversed" "";
+    "to the left, and not back": stage_sense(&RIGHT, &StageSeen { driven_ma: 20.0, moved_um: 0, ..LEFT }, Went::Back)
+        => "bridge-exchanged" "PC6 and PC7";
+    "no current":
+        stage_sense(&StageSeen { driven_ma: 24.0, ended: Err(Stopped::NoCurrent), ..RIGHT }, &LEFT, Went::Nowhere)
+        => "stage-still" "";
+    "current, and it stands":
+        stage_sense(&StageSeen { driven_ma: 26.0, ended: Err(Stopped::NoCount), ..RIGHT }, &LEFT, Went::Nowhere)
+        => "stage-stuck" "";
+    "counts down": moved(Err(Stopped::Backwards), Went::There) => "encoder-exchanged" "PD12 and PD13";
+    "counts nothing": moved(Err(Stopped::NoCount), Went::There) => "encoder-line" "A or B";
+    "current of the other sign": stage_sense(&StageSeen { driven_ma: -26.0, ..RIGHT }, &LEFT, Went::There)
+        => "current-reversed" "";
+    "current of the other sign back": stage_sense(&RIGHT, &StageSeen { driven_ma: 26.0, ..LEFT }, Went::There)
+        => "current-reversed" "";
+    "brakes": braked(-20.1, 20.1) => ;
+    "coasts to the right": braked(-19.9, 60.0) => "bridge-decay" "";
+    "coasts to the left": braked(-60.0, 19.9) => "bridge-decay" "";
+    "stopped before it could brake": bridge(&StageSeen { ended: Err(Stopped::Limit), ..RIGHT }, &LEFT)
+        => "stopped" "the stage";
+    "stopped before it could brake back": bridge(&RIGHT, &StageSeen { ended: Err(Stopped::Limit), ..LEFT })
+        => "stopped" "the stage";
+    "a gain of 0.91": of_gain(0.91) => ;
+    "a gain of 1.09": of_gain(1.09) => ;
+    "a gain of 0.89": of_gain(0.89) => "current-gain" "";
+    "a gain of 1.11": of_gain(1.11) => "current-gain" "";
+    "no gain": of_gain(0.05) => "stage-still" "";
+    "a negative gain": of_gain(-1.0) => "current-reversed" "";
+    "a motor in the resistor's place": resistor(Err(Stopped::Moves), &[], 12.0, 22.0)
+        => "motor-connected" "the stage";
+    "an emergency stop in the ramp": resistor(Err(Stopped::EStop), &[], 12.0, 22.0) => "stopped" "the stage";
+    "an empty ramp": resistor(Ok(()), &[], 12.0, 22.0) => "stopped" "the ramp";
+    "a store that keeps": store(&Ok([7, 7])) => ;
+    "a store that does not": store(&Ok([7, 0])) => "store" "";
+    "a store that refuses": store(&Err("full".to_owned())) => "store" "";
+    "a watchdog": watchdog(Some(Reset::Watchdog)) => ;
+    "another start": watchdog(Some(Reset::Pin)) => "watchdog" "";
+    "no start": watchdog(None) => "watchdog" "";
+    "weights on a line": weighed(11.5, 0.09, 7.9) => ;
+    "a hard finger": weighed(22.9, 0.0, 0.0) => ;
+    "a soft finger": weighed(5.8, 0.0, 0.0) => ;
+    "a weight that leans": weighed(11.5, 0.2, 0.0) => "scale-line" "";
+    "weights that are heavier": weighed(23.1, 0.0, 0.0) => "scale-far" "";
+    "weights that are lighter": weighed(5.7, 0.0, 0.0) => "scale-far" "";
+    "P_DC that falls": weighed(-11.5, 0.0, 0.0) => "finger-dead" "";
+    "P_DC that stands": weighed(1e4, 0.0, 0.0) => "finger-dead" "";
+    "P_DC that falls under a weight": mounted::scale(&[[42.6, 490.0], [85.3, 981.0], [127.9, 1471.0]], -8.1, 0.0)
+        => "finger-leaks" "";
+    "less P_DC afterwards": weighed(11.5, 0.0, -8.1) => "finger-leaks" "";
+    "more P_DC afterwards": weighed(11.5, 0.0, 8.1) => "finger-leaks" "";
+    "the same air": zeroed(2647.9, Some(&Ok((11.2, true)))) => ;
+    "another air": zeroed(2631.9, None) => "zero-drifts" "";
+    "a scale that is not kept": zeroed(2640.0, Some(&Ok((11.2, false)))) => "store" "";
+    "a scale that is refused": zeroed(2640.0, Some(&Err("busy".to_owned()))) => "store" "";
+    "a rig that does not home": mounted::zero(&Err("stage".to_owned()), &Err("stage".to_owned()), None) => "fault" "";
+    "even runs": runs([1.0; 4], 0.2) => ;
+    "runs 1.9 % off": runs([1.019, 0.981, 1.0, 1.0], 0.0) => ;
+    "a run 2.1 % too slow": runs([1.0, 1.0, 0.979, 1.0], 0.0) => "stage-speed" "";
+    "a run 2.1 % too fast": runs([1.0, 1.0, 1.0, 1.021], 0.0) => "stage-speed" "";
+    "a run that sticks": runs([1.0; 4], 0.4) => "stage-speed" "uneven";
+    "no runs": mounted::speed(None, &[]) => "stage-speed" "runs";
+    "a run with a fault": mounted::speed(Some("jammed"), &[]) => "fault" "";
+    "a sound slide": slid(|_| ()) => ;
+    "a late slot": slid(|seen| seen.counts.late_slots = 1) => "words" "";
+    "bad parity": slid(|seen| seen.counts.parity_errors = 1) => "words" "";
+    "an error frame": slid(|seen| seen.counts.error_frames = 1) => "words" "";
+    "a lost sample": slid(|seen| seen.counts.lost_samples = 1) => "samples-lost" "";
+    "a still slide": slid_with(|slide| slide.roughness_is_bound = true) => "slide-quiet" "";
+    "no roughness": slid_with(|slide| slide.properties[1] = None) => "slide-quiet" "";
+    "no traction": slid_with(|slide| slide.properties[0] = None) => "slide-traction" "";
+    "traction that pushes": slid_with(|slide| slide.properties[0] = Some(-0.1)) => "slide-traction" "";
+    "no slide": slid(|seen| seen.observed = None) => "fault" "";
+    "a slide that failed": slid(|seen| seen.failed = Some("force".to_owned())) => "fault" "";
+}
 
 /// Names of the cases that are judged otherwise than they should be.
 fn failing() -> Vec<&'static str> {

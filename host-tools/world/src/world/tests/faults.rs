@@ -79,28 +79,6 @@ fn a_drift_shows_in_the_static_pressure_alone() {
 }
 
 #[test]
-fn a_jammed_stage_stands_and_draws_current() {
-    let mut bench = Bench::new(Setup::default());
-    bench.world.stage_pwm(bench.now_ns, 0.2);
-    bench.wait_ms(100);
-    let free = i32::from(bench.world.motor_adc());
-    bench.world.inject(Fault::StageJammed);
-    bench.wait_ms(1);
-    let count = bench.world.encoder();
-    bench.wait_ms(100);
-    assert_eq!(bench.world.encoder(), count);
-    // 2.4 V over 7.5 ohm
-    let counts = i32::from(bench.world.motor_adc()) - 2_048;
-    assert!(
-        (counts - 397).abs() < 20 && free - 2_048 < 150,
-        "{counts} {free}"
-    );
-    bench.world.clear();
-    bench.wait_ms(100);
-    assert!(bench.world.encoder() > count + 1_000);
-}
-
-#[test]
 fn cut_encoder_wires_stop_the_count_while_the_stage_moves() {
     for (cut, spread) in [(Cut::A, 1), (Cut::B, 1), (Cut::Both, 0)] {
         let mut bench = Bench::new(Setup::default());
@@ -123,19 +101,6 @@ fn cut_encoder_wires_stop_the_count_while_the_stage_moves() {
 }
 
 #[test]
-fn lost_steps_leave_the_lever_behind() {
-    let mut bench = Bench::lowered(Setup::default());
-    let from = bench.world.truth();
-    bench.world.inject(Fault::LeverLosesSteps { share: 0.1 });
-    bench.turn_to(false);
-    bench.steps(2_000, 1_600);
-    let truth = bench.world.truth();
-    let missing = from.lever_missing_steps - truth.lever_missing_steps;
-    assert!((150.0..250.0).contains(&missing), "{missing}");
-    assert!(truth.tip_mm - from.tip_mm < 1.17);
-}
-
-#[test]
 fn a_runaway_presses_until_its_current_is_off() {
     let mut bench = Bench::pressed(setup(46, 1), 0.2);
     bench.world.inject(Fault::LeverRunaway);
@@ -150,18 +115,6 @@ fn a_runaway_presses_until_its_current_is_off() {
     let tip_mm = bench.world.truth().tip_mm;
     bench.wait_ms(200);
     assert_eq!(bench.world.truth().tip_mm, tip_mm, "it does not come back");
-}
-
-#[test]
-fn a_runaway_gives_in_to_more_steps_up() {
-    let mut bench = Bench::pressed(setup(46, 1), 0.2);
-    bench.turn_to(false);
-    bench.world.inject(Fault::LeverRunaway);
-    bench.wait_ms(200);
-    bench.steps(400, 1_600);
-    let tip_mm = bench.world.truth().tip_mm;
-    bench.wait_ms(200);
-    assert_eq!(bench.world.truth().tip_mm, tip_mm);
 }
 
 #[test]

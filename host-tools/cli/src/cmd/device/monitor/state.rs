@@ -4,20 +4,13 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use tactus_core::features::Movement;
-use tactus_core::table::{Action, Name, Table};
-use tactus_core::wire::{
-    Command, Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status,
-};
-use tactus_lab::eval::alike;
+use tactus_core::wire::{Command, Event, Live, PROTOCOL, Phase, Prompt, Report, Status};
 use tactus_lab::eval::show::count;
-use tactus_lab::remote::say::most_like;
 
 /// P_AC samples that are shown: a second.
 pub(crate) const SHOWN: usize = 2200;
-/// Notes that are kept.
 pub(crate) const NOTES: usize = 50;
 
-/// How much a note matters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Weight {
     Message,
@@ -32,28 +25,15 @@ pub(crate) struct Note {
     pub(crate) text: String,
 }
 
-/// The movement that is made, and why.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Chosen {
-    pub(crate) slide: u8,
-    pub(crate) movement: Movement,
-    pub(crate) action: Action,
-    /// uncertainty that it should leave
-    pub(crate) leaves: Option<f32>,
-}
-
-/// What is known of the probe.
 pub(crate) struct Monitor {
     pub(crate) place: String,
     pub(crate) names: Vec<String>,
-    /// of the table that these are from
-    pub(crate) table_crc: u32,
     pub(crate) status: Status,
     pub(crate) at_ms: u32,
     pub(crate) live: Option<Live>,
     pub(crate) pac: VecDeque<i16>,
-    pub(crate) chosen: Option<Chosen>,
-    pub(crate) observed: Option<SlideReport>,
+    /// the one that is made
+    pub(crate) movement: Option<Movement>,
     pub(crate) posterior: Vec<f32>,
     pub(crate) answer: Option<String>,
     pub(crate) notes: VecDeque<Note>,
@@ -67,12 +47,6 @@ pub(crate) struct Monitor {
     pub(crate) rebooted: bool,
     /// the user has had the rig stopped: what is still on the line is of what was stopped
     stopped: bool,
-    /// the help is shown
-    pub(crate) help: bool,
-    /// a name that is typed, to teach
-    pub(crate) typed: Option<String>,
-    /// it has learned a texture from the user since its table was read
-    learned: Option<Name>,
     /// what a person was asked to do last
     prompt: Option<Prompt>,
 }
@@ -82,12 +56,10 @@ impl Monitor {
         Self {
             place: place.to_owned(),
             names,
-            table_crc: status.table_crc,
             at_ms: 0,
             live: None,
             pac: VecDeque::new(),
-            chosen: None,
-            observed: None,
+            movement: None,
             posterior: Vec::new(),
             answer: None,
             notes: VecDeque::new(),
@@ -96,15 +68,11 @@ impl Monitor {
             protocol: None,
             rebooted: false,
             stopped: false,
-            help: false,
-            typed: None,
-            learned: None,
             prompt: None,
             status,
         }
     }
 
-    /// Keeps a line for people.
     pub(crate) fn note(&mut self, weight: Weight, text: impl Into<String>) {
         self.notes.push_back(Note {
             at_ms: self.at_ms,
@@ -131,16 +99,13 @@ impl Monitor {
                 "identify".to_owned()
             }
             Command::Home => "home".to_owned(),
-            Command::Label(name) => format!("teach {name}"),
-            Command::Train(train) => format!("train {}", train.name),
             _ => return,
         };
         self.note(Weight::Message, note);
     }
 
     fn forget_exploration(&mut self) {
-        self.chosen = None;
-        self.observed = None;
+        self.movement = None;
         self.posterior.clear();
         self.answer = None;
     }
@@ -150,25 +115,10 @@ impl Monitor {
         matches!(self.status.phase, Phase::Background | Phase::Sliding)
     }
 
-    /// Takes in the probe's table, and compares what was learned last with the rest of it.
-    pub(crate) fn take_table(&mut self, table: Table<'_>) {
-        self.names = table.names().map(str::to_owned).collect();
-        self.table_crc = table.crc();
-        let learned = self.learned.take().and_then(|name| table.find(&name));
-        if let Some(nearest) = learned.and_then(|texture| alike::nearest(table, texture)) {
-            self.note(Weight::Message, most_like(&nearest));
-            if nearest.feels_the_same {
-                let note = "to it the two feel the same: one texture? If not, consider more trials";
-                self.note(Weight::Fault, note);
-            }
-        }
-    }
-
     pub(crate) fn name(&self, texture: usize) -> &str {
         self.names.get(texture).map_or("?", String::as_str)
     }
 
-    /// Takes in a report.
     pub(crate) fn hear(&mut self, report: &Report) {
         self.at_ms = report.at_ms;
         match &report.event {
@@ -210,32 +160,19 @@ impl Monitor {
                 let recovery = fault.recovery();
                 self.note(Weight::Fault, format!("{fault}: {recovery} (key h)"));
             }
-            &Event::Chosen {
-                slide,
-                movement,
-                action,
-                ref expected,
+            Event::Chosen {
+                slide, movement, ..
             } => {
-                if slide == 1 {
+                if *slide == 1 {
                     self.posterior.clear();
                     self.answer = None;
-                    self.observed = None;
                 }
-                let outcome = expected.iter().find(|outcome| outcome.action == action);
-                self.chosen = Some(Chosen {
-                    slide,
-                    movement,
-                    action,
-                    leaves: outcome.map(|outcome| outcome.uncertainty),
-                });
+                self.movement = Some(*movement);
+                self.note(Weight::Message, format!("slide {slide}: {movement}"));
             }
             Event::SlideReport {
-                slide,
-                observed,
-                posterior,
-                ..
+                slide, posterior, ..
             } => {
-                self.observed = Some(observed.clone());
                 self.posterior = posterior.to_vec();
                 if let Some((p, texture)) = self.ranked().first().copied() {
                     let (name, p) = (self.name(texture), p * 100.0);
@@ -276,7 +213,6 @@ impl Monitor {
                 };
                 let slides = count(slides, "slide");
                 let note = format!("it has learned {name} {whom}: {slides}");
-                self.learned = (!learned.itself).then(|| name.clone());
                 self.note(Weight::Message, note);
             }
             Event::Block(block) => {
@@ -292,18 +228,7 @@ impl Monitor {
                     self.note(Weight::Message, format!("the display says: {prompt}"));
                 }
             }
-            Event::Damaged(_)
-            | Event::Pdc(_)
-            | Event::Weighed { .. }
-            | Event::Turned { .. }
-            | Event::Verified { .. }
-            | Event::Early(_)
-            | Event::Arm(_)
-            | Event::Done(_)
-            | Event::Refused { .. }
-            | Event::TrainingSlide { .. }
-            | Event::Calibration(_)
-            | Event::TablePart { .. } => {}
+            _ => {}
         }
     }
 

@@ -89,100 +89,29 @@ fn biotac_layout_is_taken_from_the_manifest() {
 
 #[test]
 fn biotac_manifest_errors_name_the_entry() {
-    for (from, to, parts) in [
-        (
-            "\"slides\"",
-            "\"runs\"",
-            ["manifest.json: line 1", "missing field `slides`"],
-        ),
-        (
-            "[3,30,6]",
-            "[3,30,3]",
-            [
-                "manifest.json: slides, entry 3",
-                "slide 3 of texture 4 is listed twice",
-            ],
-        ),
-        (
-            "[3,30,6]",
-            "[3,30]",
-            [
-                "manifest.json: files, m4.gz",
-                "n_slides is 3, but \"slides\" lists 2",
-            ],
-        ),
-        (
-            "[3,30,6]",
-            "[]",
-            ["manifest.json", "texture 4 (felt) has no slide"],
-        ),
-        (
-            "\"n_slides\":3",
-            "\"n_slides\":0",
-            ["manifest.json", "(felt) has no slide"],
-        ),
-        (
-            "\"speed_mm_s\":25.0",
-            "\"speed_mm_s\":0",
-            ["motion.speed_mm_s", "sliding speed 0 um/s is outside"],
-        ),
-        (
-            "\"name\":\"pac\"",
-            "\"name\":\"p\"",
-            ["manifest.json: record", "no pac"],
-        ),
-        (
-            "\"name\":\"pdc\"",
-            "\"name\":\"pac\"",
-            ["manifest.json: record", "pac is listed twice"],
-        ),
-        ("2200", "2000", ["manifest.json: record", "pac at 2000 Hz"]),
-        (
-            "\"count\":8",
-            "\"count\":4611686018427387904",
-            [
-                "manifest.json: record",
-                "pac with 4611686018427387904 values",
-            ],
-        ),
-        (
-            "\"count\":8",
-            "\"count\":7",
-            ["files, m4.gz", "bytes_raw is 90"],
-        ),
-        (
-            "\"bytes_gz\":",
-            "\"bytes_gz\":9999999999",
-            ["files, m4.gz", "far more than the 90 bytes"],
-        ),
-        (
-            "\"material\":9",
-            "\"material\":4",
-            ["manifest.json: texture 4", "\"felt\" and \"silk\""],
-        ),
-        (
-            "m9.gz",
-            "../m9.gz",
-            [
-                "manifest.json: names the file \"../m9.gz\"",
-                "not inside this folder",
-            ],
-        ),
-        (
-            "m9.gz",
-            "a/../../m9.gz",
-            ["a/../../m9.gz", "not inside this folder"],
-        ),
-        (
-            "[0.001,0.003]",
-            "[0.001,0.005]",
-            ["manifest.json: slide 3 of m4.gz", "P_AC (samples: 8"],
-        ),
-        ("m9.gz", "m8.gz", ["m8.gz", "No such file"]),
-    ] {
+    const CASES: &str = r#"
+"slides" | "runs" | manifest.json: line 1 | missing field `slides`
+[3,30,6] | [3,30,3] | manifest.json: slides, entry 3 | slide 3 of texture 4 is listed twice
+[3,30,6] | [3,30] | manifest.json: files, m4.gz | n_slides is 3, but "slides" lists 2
+[3,30,6] | [] | manifest.json | texture 4 (felt) has no slide
+"n_slides":3 | "n_slides":0 | manifest.json | (felt) has no slide
+"speed_mm_s":25.0 | "speed_mm_s":0 | motion.speed_mm_s | sliding speed 0 um/s is outside
+"name":"pac" | "name":"p" | manifest.json: record | no pac
+"name":"pdc" | "name":"pac" | manifest.json: record | pac is listed twice
+2200 | 2000 | manifest.json: record | pac at 2000 Hz
+"count":8 | "count":4611686018427387904 | manifest.json: record | pac with 4611686018427387904 values
+"count":8 | "count":7 | files, m4.gz | bytes_raw is 90
+"bytes_gz": | "bytes_gz":9999999999 | files, m4.gz | far more than the 90 bytes
+"material":9 | "material":4 | manifest.json: texture 4 | "felt" and "silk"
+m9.gz | ../m9.gz | manifest.json: names the file "../m9.gz" | not inside this folder
+m9.gz | a/../../m9.gz | a/../../m9.gz | not inside this folder
+[0.001,0.003] | [0.001,0.005] | manifest.json: slide 3 of m4.gz | P_AC (samples: 8
+m9.gz | m8.gz | m8.gz | No such file
+"#;
+    for [from, to, place, cause] in cells(CASES) {
         let folder = biotac();
         edit(&folder.path().join(files::BIOTAC_MANIFEST), from, to);
-        fails(folder.path(), &parts);
+        fails(folder.path(), &[place, cause]);
     }
 }
 
