@@ -14,7 +14,6 @@ mod faults;
 mod fingers;
 mod halt;
 mod handheld;
-mod handheld_compare;
 mod handheld_link;
 mod long_table;
 mod motion;
