@@ -82,7 +82,7 @@ fn explore(
     let flash = RamFlash::blank();
     let probe = switch_on(rig, flash, table, &mut buffer, &plan, &host);
     let mut probe: SimProbe<'_, Heard, ArmRig> = probe.unwrap();
-    let done = block_on(probe.perform(&Command::Identify(identify)));
+    let done = block_on(probe.perform(&Command::Identify(identify))).map(drop);
     for _ in 0..RESTS_MS {
         probe.rig.servo.tick();
     }

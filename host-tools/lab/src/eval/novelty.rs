@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{Config, Told};
+use tactus_core::explorer::{Config, VerdictKind};
 
 use crate::eval::evaluate::{EvaluateError, explorer, play};
 use crate::eval::experiment::{Experiment, Run};
@@ -132,7 +132,7 @@ pub fn leave_one_out(
             let told = |out: usize, bytes: &[u8]| {
                 let run = as_told.run_alone(index);
                 let mut explorer = explorer(bytes, as_told.measured(), open, None)?;
-                let outcome = play(&mut explorer, None, open.strategy, run);
+                let outcome = play(&mut explorer, open.strategy, run);
                 let is_right = place(presented, out) == Some(outcome.identified);
                 Ok::<_, EvaluateError>((outcome.told, is_right))
             };
@@ -169,10 +169,10 @@ fn episode(
     run: &mut Run<'_>,
     out: usize,
     bytes: &[u8],
-) -> Result<[(Told, bool); SLIDES], EvaluateError> {
+) -> Result<[(VerdictKind, bool); SLIDES], EvaluateError> {
     let mut explorer = explorer(bytes, experiment.measured(), config, None)?;
     let place = place(run.unknown, out);
-    let mut told = [(Told::Undecided, false); SLIDES];
+    let mut told = [(VerdictKind::Undecided, false); SLIDES];
     for told in &mut told {
         let expected = explorer.expected_outcomes();
         let action = explorer.choose(&expected, 0);
@@ -184,7 +184,7 @@ fn episode(
             .expect("every slide has the features that the table was learned from");
         let best = explorer.best();
         let is_right = place == Some(best.texture.into());
-        *told = (best.told(), is_right);
+        *told = (best.kind(), is_right);
     }
     Ok(told)
 }

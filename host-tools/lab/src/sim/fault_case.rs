@@ -408,7 +408,9 @@ fn now_ns(probe: &mut SimProbe<'_, HostLog>) -> u64 {
 
 /// Sends the probe a command; returns the reason why it was not done, in its words.
 fn send(probe: &mut SimProbe<'_, HostLog>, command: Command) -> Result<(), String> {
-    block_on(probe.perform(&command)).map_err(|why| why.to_string())
+    block_on(probe.perform(&command))
+        .map(drop)
+        .map_err(|why| why.to_string())
 }
 
 fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {

@@ -59,7 +59,7 @@ pub trait Host {
 
 /// A simulated rig that a servo drives: ours, or one that an arm moves.
 pub trait Driven {
-    /// See [`Servo::HAS_STAGE`].
+    /// See [`Servo::has_stage`].
     const HAS_STAGE: bool;
 
     /// A millisecond passes.
@@ -202,7 +202,9 @@ impl<'p, H: Host, R: Driven> SimServo<'p, H, R> {
 }
 
 impl<H: Host, R: Driven> Servo for SimServo<'_, H, R> {
-    const HAS_STAGE: bool = R::HAS_STAGE;
+    fn has_stage(&self) -> bool {
+        R::HAS_STAGE
+    }
 
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
         self.ended = None;

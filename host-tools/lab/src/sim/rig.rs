@@ -115,15 +115,7 @@ impl SimRig {
     fn of(world: World, setup: Setup, unguarded: Unguarded) -> Self {
         let reader = Reader::new(setup.finger);
         let model = reader.model();
-        let calibration = RigCalibration {
-            pressure: model.calibration,
-            unloaded_a: (0.037, 0.0),
-            newton_per_ampere: 16.4,
-            date: 0,
-            air_known: false,
-            turned: 0,
-            serial: [0; 16],
-        };
+        let calibration = RigCalibration::unmeasured(model);
         Self {
             world,
             started: reader.start().is_empty(),

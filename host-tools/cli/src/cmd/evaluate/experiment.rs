@@ -18,26 +18,25 @@ use crate::cmd::textures::measure_folder;
 /// Play thousands of virtual explorations and count the right answers
 #[derive(clap::Args, Clone)]
 #[command(after_help = "\
-Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the method
-choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more probable
-than --threshold, or after --max-slides.
+Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the
+method choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more
+probable than --threshold, or after --max-slides.
 
-First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none of those
-I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
-exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the known
-ones and slides are drawn with replacement, as in the paper.
+First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none
+of those I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide
+comes twice, and the exploration ends when the recordings run out. Then come the figures of explorations in which it
+must be one of the known ones and slides are drawn with replacement, as in the paper.
 
-With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
-validate, and an action is any (movement, property) pair.
+With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is
+train or validate, and an action is any (movement, property) pair.
 
-With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and tested on
-the other.
+With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and
+tested on the other.
 
---novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
-is taken for new.
---verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
-does, and counts the errors: at the limits, and where both are equal.
-These need the method fused.
+--novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a
+known one is taken for new. --verify holds the slides of each texture against its own reference and against those of
+three others, as `tactus verify` does, and counts the errors: at the limits, and where both are equal. These need the
+method fused.
 
 --plot draws what is told of each texture (confusion), or with --verify one error against the other (trade-off).
 

@@ -85,7 +85,6 @@ pub(crate) fn leave_one_out(
     Ok(())
 }
 
-/// Verdicts on one line.
 fn in_words(verdicts: &Verdicts) -> String {
     let words = verdict_rows(verdicts);
     let words = words.map(|(name, share, remark)| format!("{name} {:.1} %{remark}", share * 100.0));
