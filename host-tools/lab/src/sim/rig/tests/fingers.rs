@@ -1,7 +1,5 @@
 //! The fingers of parts on the simulated rig and in a simulated hand: explorations, and the result of each fault.
 
-use std::collections::BTreeSet;
-
 use crate::sim::collection::{Collection, calibrated, texture_name};
 use crate::sim::handheld;
 use crate::sim::rig::{SimError, SimRig};
@@ -210,43 +208,37 @@ fn each_fault_of_a_part_is_named_and_never_presses_too_hard() {
         ClocksOff { share: 0.05 },
         ClocksOff { share: -0.05 },
     ];
-    let mut wrong = Vec::new();
-    for finger in OTHERS {
-        for fault in faults {
-            for at in [
-                Phase::Parked,
-                Phase::Pressing,
-                Phase::Background,
-                Phase::Sliding,
-            ] {
-                let seen: Vec<_> = (1..=2u64)
-                    .into_par_iter()
-                    .map(|seed| broken(finger, fault, seed, at))
-                    .collect();
-                let most_n = seen.iter().map(|s| s.1).fold(0.0, f64::max);
-                let named: BTreeSet<_> = seen
-                    .iter()
-                    .map(|s| s.0.map_or("none", Fault::name))
-                    .collect();
-                let allowed = names(finger, fault);
-                let right = |named: Option<Fault>| match named {
-                    // once the lever holds, a cell that stands still is not checked any more
-                    None => {
-                        let started_after = matches!(fault, AccelerometerBrownOut | CellBrownOut)
-                            && at == Phase::Parked;
-                        let is_held = fault == CellBlocked && at != Phase::Parked;
-                        allowed.is_empty() || started_after || is_held
-                    }
-                    Some(named) => allowed.contains(&named),
-                };
-                if most_n > 2.2 || !seen.iter().all(|s| right(s.0)) {
-                    wrong.push(format!(
-                        "{finger}, {fault:?}, {at:?}: {named:?}, {most_n:.3} N"
-                    ));
-                }
-            }
-        }
+    let phases = [
+        Phase::Parked,
+        Phase::Pressing,
+        Phase::Background,
+        Phase::Sliding,
+    ];
+    let mut cases = Vec::new();
+    for (finger, fault) in OTHERS.iter().flat_map(|f| faults.map(|fault| (*f, fault))) {
+        cases.extend(
+            (1u64..)
+                .zip(phases)
+                .map(|(seed, at)| (finger, fault, seed, at)),
+        );
     }
+    let wrong = cases.par_iter().filter_map(|&(finger, fault, seed, at)| {
+        let (named, most_n) = broken(finger, fault, seed, at);
+        let allowed = names(finger, fault);
+        let is_right = match named {
+            // once the lever holds, a cell that stands still is not checked any more
+            None => {
+                let started_after =
+                    matches!(fault, AccelerometerBrownOut | CellBrownOut) && at == Phase::Parked;
+                let is_held = fault == CellBlocked && at != Phase::Parked;
+                allowed.is_empty() || started_after || is_held
+            }
+            Some(named) => allowed.contains(&named),
+        };
+        let says = || format!("{finger}, {fault:?}, {at:?}: {named:?}, {most_n:.3} N");
+        (most_n > 2.2 || !is_right).then(says)
+    });
+    let wrong: Vec<String> = wrong.collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
