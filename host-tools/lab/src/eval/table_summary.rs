@@ -31,6 +31,7 @@ pub struct TableSummary {
     pub(super) textures: Vec<TextureSummary>,
 }
 
+/// A movement of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 /// A movement of the table.
 pub struct MovementSummary {

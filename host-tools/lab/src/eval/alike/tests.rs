@@ -131,7 +131,7 @@ type Learn = fn(&Pair, [u8; 2], &mut ChaCha8Rng) -> (Vec<u8>, usize);
 /// Mean of the computed share, and the share of slides that the explorer takes for the other's, over many tables of
 /// pairs so far apart, at the movement that is computed to be the best.
 fn said_and_seen(learn: Learn, features: usize, apart: [f64; 3], trials: [u8; 2]) -> (f64, f64) {
-    const TABLES: u64 = 80;
+    const TABLES: u64 = 200;
     const SLIDES: u32 = 20;
     let (mut said, mut taken) = (0.0, 0);
     for seed in 0..TABLES {

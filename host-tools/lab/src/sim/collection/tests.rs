@@ -3,7 +3,7 @@ use tactus_core::table::{Contents, Table, factory};
 use super::*;
 use tactus_world::faults::Fault;
 
-/// Of each rig's table that comes with the firmware every 29th texture, learned anew: the table is of this
+/// Of each rig's table that comes with the firmware every 58th texture, learned anew: the table is of this
 /// simulator. All of each is compared by `cargo xtask campaign factory`.
 #[test]
 fn factory_tables_are_of_this_world() {
@@ -18,7 +18,7 @@ fn factory_tables_are_of_this_world() {
         };
         let collection = Collection {
             seed: 1,
-            textures: (1..=117).step_by(29).collect(),
+            textures: (1..=117).step_by(58).collect(),
             trials: 5,
         };
         let calibration = calibrated(collection.setup_with(finger, 1, 0)).unwrap();
