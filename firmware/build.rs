@@ -1,4 +1,5 @@
-//! Link arguments for the chip. They are here and not in rustflags, which RUSTFLAGS in somebody's environment would replace.
+//! Link arguments for the chip. They are here and not in rustflags, which RUSTFLAGS in somebody's environment would
+//! replace.
 use std::path::Path;
 
 fn main() {

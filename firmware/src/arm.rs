@@ -3,7 +3,7 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us | words to `arm` |
-//! | UART5's interrupt, woken by the clock's | `arm` | the rig over the link, guard, line of permission and watchdog, 1 kHz | samples to `probe`, orders to `orders`, a snapshot to all |
+//! | UART5's interrupt | `arm` | rig, guard, permission and watchdog, 1 kHz | samples to `probe`, orders, a snapshot |
 //! | thread mode | `probe` | explorations, training, tables; owns the store | commands to `arm`, reports to `send` |
 //! | thread mode | `acquire` | starts the slots when the sensor is ready | |
 //! | thread mode | `watch` | phases, faults and force as they change | reports to `send` |
@@ -14,7 +14,7 @@ use embassy_stm32::interrupt;
 
 use crate::boot::{Ends, ends, start};
 use crate::chip::thread;
-use crate::tasks::drive::{self, SERVO};
+use crate::tasks::drive::{BODY_ON_ARM, SERVO, ServoHandle};
 use crate::tasks::{acquire, arm as task, link, only, probe, watch};
 
 /// Starts everything. To be called once, from thread mode.
@@ -31,15 +31,14 @@ pub fn arm() -> ! {
     let booted = (reset, last_words);
     thread::run(|thread| {
         thread.spawn(only(link::send(tx)));
-        thread.spawn(only(link::receive(rx, &drive::BODY_ON_ARM)));
+        thread.spawn(only(link::receive(rx, BODY_ON_ARM)));
         thread.spawn(only(watch::watch(true)));
         thread.spawn(only(task::orders()));
-        thread.spawn(only(probe::probe_on_arm(
-            r.store,
-            r.go,
-            samples_out,
-            booted,
-        )));
+        let handle = ServoHandle {
+            samples: samples_out,
+            has_stage: false,
+        };
+        thread.spawn(only(probe::probe(r.store, r.go, handle, booted)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in, reset)));
         SERVO
             .start(interrupt::UART5)

@@ -1,5 +1,6 @@
-//! The bench inside the image `tactus-silicon`: does the host's workloads and counts their instructions by the core's cycle counter, which on the
-//! emulated board counts one for each. No task, no interrupt: what is counted is the core's code as the rig's image has it.
+//! The bench inside the image `tactus-silicon`: does the host's workloads and counts their instructions by the core's
+//! cycle counter, which on the emulated board counts one for each. No task, no interrupt: what is counted is the core's
+//! code as the rig's image has it.
 use core::cell::UnsafeCell;
 use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
 use core::sync::atomic::AtomicU32;
@@ -74,16 +75,14 @@ impl Counter for Cycles {
     }
 }
 
-/// What [`BENCH_WANTED`] says where the bench is wanted.
 const WANTED: u32 = 0x7ac7_be7c;
 
-/// Whether the host wants the bench: it writes so before the chip starts, and the start-up code leaves it alone. After power-up any
-/// other word is as likely as this one.
+/// Whether the host wants the bench: it writes so before the chip starts, and the start-up code leaves it alone. After
+/// power-up any other word is as likely as this one.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.BENCH_WANTED")]
 static BENCH_WANTED: AtomicU32 = AtomicU32::new(0);
 
-/// Whether the host wants the bench; once.
 fn is_wanted() -> bool {
     BENCH_WANTED.swap(0, Relaxed) == WANTED
 }

@@ -1,5 +1,5 @@
-//! The NUCLEO-F429ZI (MB1137, UM1974): its clocks, and who gets which pin and timer. Pins are named by their Arduino and Zio
-//! connectors in docs/src/rig.md.
+//! The NUCLEO-F429ZI (MB1137, UM1974): its clocks, and who gets which pin and timer. Pins are named by their Arduino
+//! and Zio connectors in docs/src/rig.md.
 
 use core::mem::ManuallyDrop;
 
@@ -88,12 +88,10 @@ assign_resources! {
         blue: PB7,
         red: PB14 = RedLed,
     }
-    /// Follows `verify`.
     go: Go {
         /// High is "the same".
         same: PC10,
     }
-    /// Of the handheld probe.
     display: Display {
         i2c: I2C1,
         scl: PB8,
@@ -107,7 +105,6 @@ assign_resources! {
         buzzer: PC9,
         tones: TIM8,
     }
-    /// The handheld's sensor of motion, if it has one.
     motion: Motion {
         spi: SPI4,
         sck: PE2,
@@ -124,7 +121,6 @@ assign_resources! {
 /// nothing else works any more.
 pub(crate) type Named<P> = <P as Named_>::Peripheral;
 
-/// See [`Named`].
 pub(crate) trait Named_ {
     type Peripheral;
 }
@@ -146,12 +142,13 @@ const LOOKS: u32 = 1000;
 /// The core after its reset.
 pub(crate) const RESET_HZ: u32 = 16_000_000;
 
-/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all. Board tests break it by its name.
+/// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all. Board tests break it
+/// by its name.
 #[unsafe(export_name = "tactus_board_start")]
 #[inline(never)]
 pub(crate) fn start() -> AssignedResources {
-    // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at either
-    // level.
+    // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at
+    // either level.
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
@@ -163,9 +160,9 @@ pub(crate) fn start() -> AssignedResources {
         defmt::error!("{=str}", NO_CLOCK);
     }
     let r = split_resources!(p);
-    // Chips before revision 3 misread bank 2 while PA12 moves (errata sheet ES0206, 2.2.11), and the store is in bank 2.
-    // embassy's flash driver wants exactly this, an output that is low and pulled down, and panics otherwise; so PA12 is
-    // taken before anything can read the store, and is no one else's. Other chips do without, and lose nothing.
+    // Chips before revision 3 misread bank 2 while PA12 moves (errata sheet ES0206, 2.2.11), and the store is in bank
+    // 2. embassy's flash driver wants exactly this, an output that is low and pulled down, and panics otherwise; so
+    // PA12 is taken before anything can read the store, and is no one else's. Other chips do without, and lose nothing.
     core::mem::forget(OutputOpenDrain::new_pull(
         // SAFETY: nobody else takes PA12, and it is never given back.
         unsafe { r.errata.pa12.clone_unchecked() },
@@ -173,16 +170,15 @@ pub(crate) fn start() -> AssignedResources {
         Speed::Low,
         Pull::Down,
     ));
-    // Critical sections mask all but the slots' priority, so nobody else may have it, as whoever is not set below would.
-    // not by `Peripherals::steal`, after which nobody could take them
-    // SAFETY: nobody else sets priorities.
+    // Critical sections mask all but the slots' priority, so nobody else may have it, as whoever is not set below
+    // would. not by `Peripherals::steal`, after which nobody could take them SAFETY: nobody else sets priorities.
     let nvic = unsafe { &*cortex_m::peripheral::NVIC::PTR };
     for priority in nvic.ipr.iter().take(INTERRUPTS) {
         // SAFETY: no critical section is open.
         unsafe { priority.write(MASKED as u8) };
     }
-    // The slots of the sensor before all; a byte of the link waits at most 10.8 us, then it is lost; the lever's steps, the
-    // clock and the servo have more time.
+    // The slots of the sensor before all; a byte of the link waits at most 10.8 us, then it is lost; the lever's steps,
+    // the clock and the servo have more time.
     interrupt::TIM2.set_priority(Priority::P0);
     interrupt::SPI1.set_priority(Priority::P0);
     interrupt::USART3.set_priority(Priority::P2);
@@ -193,10 +189,10 @@ pub(crate) fn start() -> AssignedResources {
     r
 }
 
-/// embassy sets the wait states alone, five at 168 MHz: prefetch and the instruction cache make up for them (RM0090 3.5.2).
-/// No line of that cache goes stale: bank 2 alone is ever erased, and no code is in it. The data cache stays off. It must
-/// be off while one bank is written and the other one read (ES0206 2.2.12), and would keep what was there before;
-/// embassy's driver means to see to both, but takes this part for one with a single bank, since the list of its
+/// embassy sets the wait states alone, five at 168 MHz: prefetch and the instruction cache make up for them (RM0090
+/// 3.5.2). No line of that cache goes stale: bank 2 alone is ever erased, and no code is in it. The data cache stays
+/// off. It must be off while one bank is written and the other one read (ES0206 2.2.12), and would keep what was there
+/// before; embassy's driver means to see to both, but takes this part for one with a single bank, since the list of its
 /// regions ends with the OTP area.
 fn start_caches() {
     FLASH_INTERFACE.acr().modify(|w| {
@@ -228,13 +224,12 @@ fn find_clock() -> bool {
     found
 }
 
-/// Whether the chip runs by the debug probe's 8 MHz.
 pub(crate) fn has_clock() -> bool {
     RCC.pllcfgr().read().pllsrc() == Pllsrc::HSE
 }
 
-/// 168 MHz: the fastest without overdrive, and its PLL gives the 48 MHz of USB. By the debug probe's 8 MHz on OSC_IN, or by
-/// the chip's own 16.
+/// 168 MHz: the fastest without overdrive, and its PLL gives the 48 MHz of USB. By the debug probe's 8 MHz on OSC_IN,
+/// or by the chip's own 16.
 fn clocks(external: bool) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     let (source, prediv) = if external {

@@ -1,5 +1,5 @@
-//! The beginning that images share: watchdog, stack guard, clocks and pins; and the line to the host with the queues between the tasks
-//! of a rig and of a probe on an arm.
+//! The beginning that images share: watchdog, stack guard, clocks and pins; and the line to the host with the queues
+//! between the tasks of a rig and of a probe on an arm.
 use embassy_stm32::usart::{BufferedUartRx, BufferedUartTx};
 use heapless::spsc::{Consumer, Producer, Queue};
 use static_cell::ConstStaticCell;
@@ -12,7 +12,8 @@ use crate::chip::{rescue, watchdog};
 use crate::tasks::drive::SAMPLES;
 use crate::tasks::link;
 
-/// Starts the board: the pins, why the chip started, and what was said before that. To be called once, from thread mode.
+/// Starts the board: the pins, why the chip started, and what was said before that. To be called once, from thread
+/// mode.
 pub(crate) fn start(image: &str) -> (board::AssignedResources, Reset, Option<Text>) {
     let (reset, last_words) = rescue::reset_cause();
     watchdog::start();
@@ -25,7 +26,8 @@ pub(crate) fn start(image: &str) -> (board::AssignedResources, Reset, Option<Tex
     (r, reset, last_words)
 }
 
-/// The ends of the line to the host, and of the queues from the sensor's slots to the rig and from there to the features.
+/// The ends of the line to the host, and of the queues from the sensor's slots to the rig and from there to the
+/// features.
 pub(crate) struct Ends {
     pub(crate) tx: BufferedUartTx<'static>,
     pub(crate) rx: BufferedUartRx<'static>,

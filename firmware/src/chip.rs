@@ -1,5 +1,5 @@
-//! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its converter's motor current, its
-//! last acts, and the core's kernels in its assembly.
+//! What only this chip can do: its flash, the sensor's slots by its interrupts, its sleep, its timers' lever, its
+//! converter's motor current, its last acts, and the core's kernels in its assembly.
 mod bank2;
 mod critical_section;
 pub(crate) mod current;

@@ -3,7 +3,7 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us | words to `servo` |
-//! | UART5's interrupt, woken by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `probe`, a snapshot to all |
+//! | UART5's interrupt, by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `probe`, a snapshot |
 //! | thread mode | `probe` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
 //! | thread mode | `acquire` | starts the slots when the sensor is ready | |
 //! | thread mode | `watch` | phases, faults and places as they change | reports to `send` |
@@ -16,7 +16,7 @@ use embassy_stm32::interrupt;
 
 use crate::boot::{Ends, ends, start};
 use crate::chip::thread;
-use crate::tasks::drive::{self, SERVO};
+use crate::tasks::drive::{BODY, SERVO, ServoHandle};
 use crate::tasks::{acquire, link, only, probe, servo, watch};
 
 /// Starts everything. To be called once, from thread mode.
@@ -34,12 +34,16 @@ pub fn rig() -> ! {
     // those of thread mode run when all are there, `servo`, which has the motors, at once: it is the last one
     thread::run(|thread| {
         thread.spawn(only(link::send(tx)));
-        thread.spawn(only(link::receive(rx, &drive::BODY)));
+        thread.spawn(only(link::receive(rx, BODY)));
         thread.spawn(only(watch::watch(false)));
-        thread.spawn(only(probe::probe(r.store, r.go, samples_out, booted)));
+        let handle = ServoHandle {
+            samples: samples_out,
+            has_stage: true,
+        };
+        thread.spawn(only(probe::probe(r.store, r.go, handle, booted)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in, reset)));
-        SERVO.start(interrupt::UART5).spawn(only(servo::servo(
-            r.lever, r.stage, r.current, r.switches, r.watchdog, words_out, samples_in,
-        )));
+        let pins = servo::Pins::new(r.lever, r.stage, r.current, r.switches);
+        let servo = servo::servo(pins, r.watchdog, words_out, samples_in);
+        SERVO.start(interrupt::UART5).spawn(only(servo));
     })
 }

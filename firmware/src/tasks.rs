@@ -12,7 +12,6 @@ mod level;
 pub(crate) mod link;
 pub(crate) mod outbox;
 pub(crate) mod probe;
-mod rig_handle;
 pub(crate) mod servo;
 pub(crate) mod watch;
 

@@ -6,7 +6,8 @@ use tactus_core::sensor::biotac::{WordError, decode, encode};
 use tactus_core::sensor::pressure::{Calibration, Counts};
 
 pub(crate) fn main() {
-    // recorded answers, most significant byte first: bits 11 to 5 and a parity bit, bits 4 to 0, two zeros and a parity bit
+    // recorded answers, most significant byte first: bits 11 to 5 and a parity bit, bits 4 to 0, two zeros and a parity
+    // bit
     let words = [
         ([0x80, 0x01], "P_AC at rest"),
         ([0xA2, 0x08], "P_DC at rest"),

@@ -5,7 +5,6 @@ mod answer;
 mod candidates;
 mod choice;
 mod config;
-mod confusions;
 mod early;
 mod episode;
 mod gaussians;
@@ -23,10 +22,9 @@ mod whitened;
 pub use answer::{Answer, Verification};
 pub use choice::{ExpectedOutcome, benefit, confusion};
 pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strategy};
-pub use confusions::{Confusions, Degrees};
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
-pub use posterior::{Explorer, Told, Verdict};
+pub use posterior::{Explorer, LEADING, Verdict, VerdictKind};
 pub use verify::ENOUGH_TRIALS;
 
 #[cfg(test)]

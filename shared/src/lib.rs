@@ -1,9 +1,9 @@
-//! The core of Tactus: it turns the samples of a slide into properties, keeps what every texture feels like, and chooses
-//! each next movement (Bayesian exploration, Fishel & Loeb 2012). Equation and table numbers in these pages are that
-//! paper's.
+//! The core of Tactus: it turns the samples of a slide into properties, keeps what every texture feels like, and
+//! chooses each next movement (Bayesian exploration, Fishel & Loeb 2012). Equation and table numbers in these pages are
+//! that paper's.
 //!
-//! The crate has no std, no allocation, no unsafe code, no clock and no statics: the same functions run on the chip and on
-//! a PC, and give the same bits.
+//! The crate has no std, no allocation, no unsafe code, no clock and no statics: the same functions run on the chip and
+//! on a PC, and give the same bits.
 #![no_std]
 #![forbid(unsafe_code)]
 // Nothing panics on the chip: what these do not see, `cargo xtask size` finds in the images.

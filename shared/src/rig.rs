@@ -2,8 +2,8 @@
 //!
 //! A property means something only for the movement that made it, so moving and sensing are one act.
 //!
-//! What is done every millisecond is `#[inline]` here: so it is compiled with the firmware, which is optimised for size,
-//! and not with the kernels of this crate.
+//! What is done every millisecond is `#[inline]` here: so it is compiled with the firmware, which is optimised for
+//! size, and not with the kernels of this crate.
 
 pub mod arm;
 mod ascent;
@@ -31,8 +31,8 @@ use crate::features::{PropertySet, Slide};
 pub use fault::{FAULTS, Fault};
 pub use phase::{Ended, HIGH_FORCE_MN, Phase, Refused, RigError, most_mn};
 
-/// Slides in a row that came to nothing, after which an exploration ends: each movement is tried twice, so these are three
-/// movements.
+/// Slides in a row that came to nothing, after which an exploration ends: each movement is tried twice, so these are
+/// three movements.
 pub const MAX_REJECTED: u8 = 6;
 
 /// Whether no more of a slide is needed.
@@ -54,16 +54,12 @@ pub trait Rig {
 
     /// Makes the movement of `slide`: presses, measures the still finger, slides, and gives it all samples in blocks.
     /// The finger may still be on its way up: see [`Rig::lifted`].
-    ///
-    /// # Errors
-    /// The movement failed. The stage then stands still and the finger is lifted.
+    /// Errors: the movement failed. The stage then stands still and the finger is lifted.
     async fn perform(&mut self, slide: &mut Slide<'_>) -> Result<(), Self::Error>;
 
-    /// As [`Rig::perform`]; the slide ends as soon as `enough`, asked after each of its blocks, says that no more of it is needed,
-    /// and takes in none of what comes after that. A rig that makes all slides to their end does not ask.
-    ///
-    /// # Errors
-    /// As [`Rig::perform`].
+    /// As [`Rig::perform`]; the slide ends as soon as `enough`, asked after each of its blocks, says that no more of it
+    /// is needed, and takes in none of what comes after that. A rig that makes all slides to their end does not ask.
+    /// Errors: as [`Rig::perform`].
     async fn perform_until(
         &mut self,
         slide: &mut Slide<'_>,
@@ -74,15 +70,13 @@ pub trait Rig {
 
     /// Waits until the finger is lifted, which takes longer than it takes to judge the slide. For a rig whose movements
     /// end with that, or that has no finger, there is nothing to wait for.
-    ///
-    /// # Errors
-    /// The finger was not lifted as it should; it is now, unless that is what fails.
+    /// Errors: the finger was not lifted as it should; it is now, unless that is what fails.
     async fn lifted(&mut self) -> Result<(), Self::Error> {
         Ok(())
     }
 
-    /// Whether a movement can be tried again after this failure, once the rig has done by itself what that takes. One that
-    /// needs a person cannot.
+    /// Whether a movement can be tried again after this failure, once the rig has done by itself what that takes. One
+    /// that needs a person cannot.
     async fn recover(&mut self, _failed: &Self::Error) -> bool {
         false
     }

@@ -16,8 +16,8 @@ use tactus_core::wire::{Command, Event, Failure, Identify, Rejection, Verdict};
 use tactus_lab::sim::collection::{Collection, texture_name, texture_number};
 use tactus_lab::sim::flash::{RamFlash, TABLE};
 use tactus_lab::sim::over_link::ArmRig;
-use tactus_lab::sim::press::FORCE_LIMIT_N;
 use tactus_lab::sim::probe::{Host, SimProbe, switch_on};
+use tactus_lab::sim::rig::FORCE_LIMIT_N;
 use tactus_tests::seeds;
 use tactus_world::arm_program::Misbehaves;
 use tactus_world::world::Setup;
@@ -82,7 +82,7 @@ fn explore(
     let flash = RamFlash::blank();
     let probe = switch_on(rig, flash, table, &mut buffer, &plan, &host);
     let mut probe: SimProbe<'_, Heard, ArmRig> = probe.unwrap();
-    let done = block_on(probe.perform(&Command::Identify(identify)));
+    let done = block_on(probe.perform(&Command::Identify(identify))).map(drop);
     for _ in 0..RESTS_MS {
         probe.rig.servo.tick();
     }

@@ -3,7 +3,7 @@
 
 use rand::Rng as _;
 use rayon::prelude::*;
-use tactus_core::explorer::{Config, Method, Told};
+use tactus_core::explorer::{Config, Method, VerdictKind};
 use tactus_core::features::Property;
 use tactus_core::features::{FeatureSet, Observation};
 use tactus_lab::data::properties::PropertyTable;
@@ -173,8 +173,12 @@ fn explore_fused(
 }
 
 /// These explorations are closed.
-fn told(sure: bool) -> Told {
-    if sure { Told::Sure } else { Told::Undecided }
+fn told(sure: bool) -> VerdictKind {
+    if sure {
+        VerdictKind::Sure
+    } else {
+        VerdictKind::Undecided
+    }
 }
 
 /// Features of a slide as real numbers.

@@ -3,7 +3,7 @@
 #[path = "oracle/verdicts.rs"]
 mod verdicts;
 
-use verdicts::{Drift, Judge, Told};
+use verdicts::{Drift, Judge, VerdictKind};
 
 use crate::oracle;
 
@@ -32,7 +32,7 @@ impl Random {
 /// A table that the product learns has the limits of the recipe, as far as draws go, and tells the same.
 #[test]
 fn a_learned_table_is_calibrated_as_the_recipe_says() {
-    use tactus_core::explorer::{Config, Explorer, Method, Told as Product};
+    use tactus_core::explorer::{Config, Explorer, Method, VerdictKind as Product};
     use tactus_core::features::{Movement, Observation, Properties, PropertySet};
     use tactus_core::table::Table;
     let (textures, d) = (19, 13);
@@ -100,15 +100,15 @@ fn a_learned_table_is_calibrated_as_the_recipe_says() {
             }
             let (told, best) = judge.tell(&mean, k, 0.01);
             let here = explorer.best();
-            let kind = match here.told() {
-                Product::New => Told::New,
-                Product::Changed => Told::Changed,
-                Product::Sure => Told::Sure,
-                Product::Undecided => Told::Undecided,
+            let kind = match here.kind() {
+                Product::New => VerdictKind::New,
+                Product::Changed => VerdictKind::Changed,
+                Product::Sure => VerdictKind::Sure,
+                Product::Undecided => VerdictKind::Undecided,
             };
             kinds[kind as usize] += 1;
             all += 1;
-            let named = matches!(told, Told::New) || usize::from(here.texture) == best;
+            let named = matches!(told, VerdictKind::New) || usize::from(here.texture) == best;
             same += usize::from(kind == told && named);
         }
     }

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use tactus_core::features::Movement;
 use tactus_core::rig::Ended;
 use tactus_core::rig::guard::Unguarded;
-use tactus_lab::sim::press::{Bench, Press, Trouble};
 use tactus_tests::seeds;
 use tactus_world::mount::Mount;
 
+use crate::press::{Bench, Press, Trouble};
 use crate::rigs::texture;
 
 /// On the mount that such a rig is to have, and on none.

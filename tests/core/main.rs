@@ -16,6 +16,7 @@ mod oracle;
 mod pace;
 mod page;
 mod played;
+mod press;
 mod presses;
 mod recordings;
 mod refresh;

@@ -9,13 +9,13 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Fault, Phase};
 use tactus_core::sensor::FingerName;
 use tactus_lab::sim::collection::Collection;
-use tactus_lab::sim::press::{self, Bench, Campaign, FORCE_LIMIT_N, Press, Trouble};
-use tactus_lab::sim::rig::SimRig;
+use tactus_lab::sim::rig::{FORCE_LIMIT_N, SimRig};
 use tactus_tests::{count, seeds};
 use tactus_world::faults::Fault as Cause;
 use tactus_world::mount::Mount;
 use tactus_world::world::Setup;
 
+use crate::press::{self, Bench, Campaign, Press, Trouble};
 use crate::rigs::texture;
 
 /// Objects to presses that were too hard, and to sound ones that were refused.

@@ -4,7 +4,7 @@
 use embassy_futures::block_on;
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;
-use tactus_core::explorer::{Config, Explorer, Method, Told};
+use tactus_core::explorer::{Config, Explorer, Method, VerdictKind};
 use tactus_core::features::{Observation, PropertySet, Slide};
 use tactus_core::probe::explore::explore;
 use tactus_core::rig::Rig as _;
@@ -63,7 +63,7 @@ fn told(world: &Collection, bytes: &[u8], finger: Finger) -> f64 {
             let mut explorer = Explorer::<'_, 128>::new(table, PropertySet::ALL, config).unwrap();
             let verdict = block_on(explore(&mut rig, &mut explorer, &Plan::new(), || 0, |_| {}));
             let verdict = verdict.unwrap();
-            verdict.told() == Told::Sure && verdict.texture == *at
+            verdict.kind() == VerdictKind::Sure && verdict.texture == *at
         })
         .count();
     told as f64 / visits.len() as f64

@@ -71,7 +71,7 @@ fn ask(
     let mut probe = probe.unwrap();
     let asked = commands.iter().map(|command| {
         *heard.borrow_mut() = Heard::default();
-        let done = block_on(probe.perform(command));
+        let done = block_on(probe.perform(command)).map(drop);
         (done, heard.take())
     });
     asked.collect()

@@ -28,7 +28,6 @@ use crate::chip::current::{CONVERSIONS, Current};
 
 const CORE_HZ: u32 = 168_000_000;
 
-/// Samples of a slide of 3 s.
 const SAMPLES: usize = 3 * RATE_HZ as usize;
 type Words = Vec<i16, SAMPLES>;
 const RESULTS: usize = 4096;
@@ -66,7 +65,6 @@ const OFF_PPM: u32 = 200;
 /// None of them takes longer.
 const PATIENCE_CYCLES: u32 = CORE_HZ / 100;
 
-/// How the checks went so far.
 #[derive(Default)]
 struct Results {
     passed: u32,
@@ -131,7 +129,6 @@ fn leave(good: bool) {
     }
 }
 
-/// The plain kernels are not counted.
 struct Uncounted;
 
 impl Counter for Uncounted {
@@ -140,7 +137,6 @@ impl Counter for Uncounted {
     }
 }
 
-/// Results of a workload, as far as there is room for them.
 struct Output {
     bytes: [u8; RESULTS],
     length: usize,
@@ -154,7 +150,6 @@ impl Output {
         }
     }
 
-    /// Runs a workload with the kernels of a plan; `None` if there are no results.
     fn run(
         &mut self,
         workload: Workload,
@@ -207,18 +202,15 @@ fn kernels(results: &mut Results) {
     }
 }
 
-/// Numbers that look random and are always the same.
 struct Noise(u32);
 
 impl Noise {
-    /// The next one, below `reach` either way.
     fn next(&mut self, reach: i16) -> i16 {
         self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         ((i32::from(reach) * ((self.0 >> 16) as i32 - 32_768)) >> 15) as i16
     }
 }
 
-/// Adds the samples of a slide: a triangle every 20 of them, and noise.
 fn slide(words: &mut Words) {
     let mut noise = Noise(1);
     for at in 0..SAMPLES as i16 {
@@ -248,7 +240,6 @@ fn cycles_of(times: u32, mut happens: impl FnMut() -> bool) -> Option<u32> {
     Some(ended.wrapping_sub(began))
 }
 
-/// Says whether something takes so many cycles, in the mean of several times.
 fn judge(results: &mut Results, name: &str, found: Option<u32>, times: u32, each: u32) {
     let Some(found) = found else {
         results.check(false, name, "it does not come");

@@ -1,5 +1,5 @@
-//! What `cargo xtask bench` counts: the core's functions as the rig calls them, on what the host gives. The emulator's bench
-//! compiles this file too and runs the same with the plain kernels; results must be equal to the bit.
+//! What `cargo xtask bench` counts: the core's functions as the rig calls them, on what the host gives. The emulator's
+//! bench compiles this file too and runs the same with the plain kernels; results must be equal to the bit.
 
 use core::hint::black_box;
 
@@ -14,10 +14,7 @@ use tactus_core::table::{Action, Table};
 
 /// Forces in a block: one each tick of the servo's.
 const SHEARS: usize = BLOCK * 1000 / RATE_HZ as usize;
-/// Textures at most: the firmware's own.
 const CAPACITY: usize = tactus_core::table::MAX_TEXTURES;
-/// About as many as fit at all: a choice takes 64 bytes of stack for each, and posterior and distances 20.
-pub const MOST_TEXTURES: usize = 1500;
 
 /// What is counted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -133,8 +130,8 @@ impl ObservedSlide {
     }
 }
 
-/// Runs a workload on the samples or the observed slide in `words`, which the background precedes, and writes its results;
-/// `None` if the words make no sense.
+/// Runs a workload on the samples or the observed slide in `words`, which the background precedes, and writes its
+/// results; `None` if the words make no sense.
 pub fn run(
     workload: Workload,
     plan: &Plan,
@@ -175,21 +172,20 @@ pub fn run(
             });
             put_observation(&observed.ok()?, put);
         }
-        _ => {
-            let table = Table::read(table).ok()?;
-            if usize::from(table.textures()) <= CAPACITY {
-                explore::<CAPACITY>(workload, plan, table, words, counter, put)?;
-            } else {
-                explore::<MOST_TEXTURES>(workload, plan, table, words, counter, put)?;
-            }
-        }
+        _ => explore(
+            workload,
+            plan,
+            Table::read(table).ok()?,
+            words,
+            counter,
+            put,
+        )?,
     }
     Some(())
 }
 
-// a stack frame of its own: the frame with the larger buffer would not fit beside any other
 #[inline(never)]
-fn explore<const N: usize>(
+fn explore(
     workload: Workload,
     plan: &Plan,
     table: Table<'_>,
@@ -202,13 +198,13 @@ fn explore<const N: usize>(
         method: observed.method,
         ..Config::default()
     };
-    let begin = || Explorer::<N>::new(table, PropertySet::ALL, config);
+    let begin = || Explorer::<CAPACITY>::new(table, PropertySet::ALL, config);
     let mut explorer = if workload == Workload::Begin {
         counter.count(begin).ok()?
     } else {
         begin().ok()?
     };
-    let choose = |explorer: &Explorer<'_, N>| {
+    let choose = |explorer: &Explorer<'_, CAPACITY>| {
         let mut outcomes = Vec::new();
         explorer.evaluate_actions(&mut outcomes);
         black_box(explorer.choose(black_box(&outcomes), 0))
@@ -260,8 +256,7 @@ fn explore<const N: usize>(
     for p in explorer.posterior() {
         put(&p.to_le_bytes());
     }
-    let log_odds = explorer.log_odds().unwrap_or(f32::NAN);
-    put(&log_odds.to_bits().to_le_bytes());
+    put(&explorer.log_odds().unwrap_or(f32::NAN).to_le_bytes());
     let action = chosen.unwrap_or_else(|| choose(&explorer));
     put(&[action.movement]);
     for outcome in &explorer.expected_outcomes() {
@@ -284,7 +279,6 @@ fn slide_of<'p>(plan: &'p Plan, samples: &[i16]) -> (Slide<'p>, Block) {
     (slide, block)
 }
 
-/// Makes it the next block, with the tangential force of each ms.
 fn fill(block: &mut Block, samples: &[i16]) {
     block.number += 1;
     block.pac.clear();

@@ -1,4 +1,4 @@
-//! The image of a probe on somebody else's arm: see `tactus_firmware::arm`.
+//! The image of `tactus_firmware::arm`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -8,9 +8,4 @@ fn main() -> ! {
 }
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!(
-        "tactus-arm is firmware for the STM32F429ZI and does nothing on a PC. Run it on the emulated board with `cargo xtask emulate --port N --arm-port N`."
-    );
-    std::process::exit(2);
-}
+include!("../on_a_pc.rs");

@@ -1,4 +1,4 @@
-//! The image of the handheld probe: see `tactus_firmware::handheld`.
+//! The image of `tactus_firmware::handheld`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -8,9 +8,4 @@ fn main() -> ! {
 }
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!(
-        "tactus-handheld is firmware for the STM32F429ZI and does nothing on a PC. `cargo xtask test` plays the scenarios in host-tools/emulator/scenarios with it on the emulated board."
-    );
-    std::process::exit(2);
-}
+include!("../on_a_pc.rs");

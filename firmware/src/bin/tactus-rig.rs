@@ -1,4 +1,4 @@
-//! The image of the rig: see `tactus_firmware::rig`.
+//! The image of `tactus_firmware::rig`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -8,9 +8,4 @@ fn main() -> ! {
 }
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!(
-        "tactus-rig is firmware for the STM32F429ZI and does nothing on a PC. Run it on the emulated board with `cargo xtask emulate`."
-    );
-    std::process::exit(2);
-}
+include!("../on_a_pc.rs");

@@ -1,4 +1,4 @@
-//! The board's self-test: see `tactus_firmware::selftest`.
+//! The image of `tactus_firmware::selftest`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -8,9 +8,4 @@ async fn main(_spawner: embassy_executor::Spawner) {
 }
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!(
-        "tactus-selftest is firmware for the STM32F429ZI and does nothing on a PC. Flash it with `cargo xtask flash --self-test`."
-    );
-    std::process::exit(2);
-}
+include!("../on_a_pc.rs");

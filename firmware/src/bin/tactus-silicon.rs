@@ -1,4 +1,4 @@
-//! What only the chip itself can answer: see `tactus_firmware::silicon`.
+//! The image of `tactus_firmware::silicon`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -8,9 +8,4 @@ async fn main(_spawner: embassy_executor::Spawner) {
 }
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!(
-        "tactus-silicon is firmware for the STM32F429ZI and does nothing on a PC. Flash it with `cargo xtask flash --test`."
-    );
-    std::process::exit(2);
-}
+include!("../on_a_pc.rs");

@@ -40,8 +40,8 @@ impl NorFlash for Bank2 {
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
         let length = to.saturating_sub(from);
         let from = within(from, length as usize)?;
-        // The driver leaves the width as it is, 8 bits, which doubles the time. The supply allows 32 (RM0090 3.6.2). It keeps
-        // what an unlocked register holds, and locks it in the end.
+        // The driver leaves the width as it is, 8 bits, which doubles the time. The supply allows 32 (RM0090 3.6.2). It
+        // keeps what an unlocked register holds, and locks it in the end.
         if FLASH.cr().read().lock() {
             FLASH.keyr().write_value(0x4567_0123);
             FLASH.keyr().write_value(0xCDEF_89AB);

@@ -10,9 +10,7 @@ use tactus_core::dsp::{
 
 use super::transform_kernel;
 
-/// Outputs of the band-pass that are computed at once.
 const AT_ONCE: usize = 12;
-/// How many times that at most from one buffer.
 const MOST: usize = 22;
 /// Words of even samples, of sums and of odd ones that these take: the last ones are read, and do not count.
 const WORDS: usize = (TAPS - 1 + MOST * AT_ONCE) / 4 + 4;
@@ -297,13 +295,10 @@ fn fold_frame<'r>(
             odd = inout(reg) begin => _,
             even = inout(reg) begin.add(FRAME / 4) => _,
             end = in(reg) begin.add(FRAME / 4),
-            a = out(reg) _,
-            b = out(reg) _,
-            c = out(reg) _,
-            d = out(reg) _,
-            x = out(reg) _,
+            a = out(reg) _, b = out(reg) _, c = out(reg) _, d = out(reg) _, x = out(reg) _,
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _,
+            out("s15") _,
             out("s16") _, out("s17") _, out("s18") _, out("s19") _,
             options(nostack),
         );
@@ -361,7 +356,8 @@ unsafe fn fold_fours(
             even = inout(reg) folded.add(half) => _,
             end = in(reg) folded.add(half),
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _,
+            out("s15") _,
             out("s16") _, out("s17") _, out("s18") _, out("s19") _,
             options(nostack),
         );
@@ -403,14 +399,15 @@ unsafe fn add_power_eights(bins: *const Complex32, sums: *mut f32, many: usize) 
             sums = inout(reg) sums => _,
             end = in(reg) sums.add(many),
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
-            out("s16") _, out("s17") _, out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _, out("s23") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _,
+            out("s15") _,
+            out("s16") _, out("s17") _, out("s18") _, out("s19") _, out("s20") _, out("s21") _, out("s22") _,
+            out("s23") _,
             options(nostack),
         );
     }
 }
 
-/// Those for a Cortex-M4F.
 pub(crate) const KERNELS: Kernels = Kernels {
     clip,
     band_energy,

@@ -1,5 +1,5 @@
-//! The finger that is on the sensor's bus: looked for when the chip starts, before anything needs to know it. Every task that does
-//! waits for [`found`].
+//! The finger that is on the sensor's bus: looked for when the chip starts, before anything needs to know it. Every
+//! task that does waits for [`found`].
 use core::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
 use cortex_m::peripheral::SCB;
@@ -41,12 +41,10 @@ pub(crate) fn name() -> FingerName {
     known().unwrap_or_default()
 }
 
-/// The same as messages and tables have it.
 pub(crate) fn code() -> FingerCode {
     FingerCode::of(name())
 }
 
-/// What it is on its bus.
 pub(crate) fn parts() -> &'static FingerParts {
     name().parts()
 }
@@ -75,8 +73,8 @@ pub(crate) async fn find_at_boot(bus: &mut Bus, reset: Reset) -> bool {
     finger.is_some()
 }
 
-/// Looks again, where there was nothing: whether it is there now. All that was begun is for the finger of this start, so that another
-/// one starts the chip anew; the lever's first act is then to lift.
+/// Looks again, where there was nothing: whether it is there now. All that was begun is for the finger of this start,
+/// so that another one starts the chip anew; the lever's first act is then to lift.
 pub(crate) fn find_again(bus: &mut Bus) -> bool {
     match look(bus) {
         None => false,
@@ -88,7 +86,6 @@ pub(crate) fn find_again(bus: &mut Bus) -> bool {
     }
 }
 
-/// Which finger answers now: some ms.
 fn look(bus: &mut Bus) -> Option<FingerName> {
     find(|finger, transaction, wait_us| {
         let port = finger.parts().ports.get(usize::from(transaction.port));
@@ -101,15 +98,11 @@ fn look(bus: &mut Bus) -> Option<FingerName> {
     })
 }
 
-/// Waits for so many whole us, and the part of one that has passed.
 fn wait(us: u32) {
     block_for(Duration::from_micros((us + 1).into()));
 }
 
 /// Does the finger's start-up list, and waits for it: 25 ms of a `mems`.
-///
-/// # Errors
-/// A part does not answer as it must.
 pub(crate) fn start(bus: &mut Bus) -> Result<(), Unexpected> {
     let parts = parts();
     for step in parts.start {

@@ -26,7 +26,6 @@ const LOOK: Duration = Duration::from_millis(100);
 #[unsafe(link_section = ".ccm.BUFFER")]
 static mut BUFFER: MaybeUninit<[u8; MAX_TABLE]> = MaybeUninit::uninit();
 
-/// The buffer for a table, once.
 pub(crate) fn buffer() -> &'static mut [u8] {
     static ONCE: ConstStaticCell<()> = ConstStaticCell::new(());
     ONCE.take();
@@ -38,17 +37,13 @@ pub(crate) fn buffer() -> &'static mut [u8] {
     }
 }
 
-/// The store.
-///
-/// # Errors
-/// It cannot be opened.
 pub(crate) async fn open(flash: board::Storage) -> Result<Storage, StoreError> {
     Store::open(Bank2::new(flash)).await
 }
 
 /// Waits for a store that is being opened; `progress` is called at every look. An erase under way must not be dropped:
-/// embassy's driver would lock the flash then, and a write to its control register has the core stand until the flash is ready
-/// (RM0090 3.6.1).
+/// embassy's driver would lock the flash then, and a write to its control register has the core stand until the flash
+/// is ready (RM0090 3.6.1).
 ///
 /// # Errors
 /// It cannot be opened, or the flash says nothing for 10 s.
@@ -57,7 +52,8 @@ pub(crate) async fn wait(
     progress: impl Fn(),
 ) -> Result<Storage, StoreError> {
     let mut opening = ManuallyDrop::new(opening);
-    // SAFETY: it stays where it is while it is polled. Given up, nothing refers to it: the driver keeps a waker of the task.
+    // SAFETY: it stays where it is while it is polled. Given up, nothing refers to it: the driver keeps a waker of the
+    // task.
     let mut opening = unsafe { Pin::new_unchecked(&mut *opening) };
     for _ in 0..LOOKS {
         progress();
@@ -68,7 +64,6 @@ pub(crate) async fn wait(
     Err(StoreError::Silent)
 }
 
-/// The stored table, where it lies.
 pub(crate) struct MappedTable;
 
 impl StoredBytes<Bank2> for MappedTable {
@@ -79,8 +74,8 @@ impl StoredBytes<Bank2> for MappedTable {
     fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {
         let table = store.table()?;
         let at = table.offset as usize;
-        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only when
-        // the one after next is begun, and no reader of this slice lives that long.
+        // SAFETY: the store's sectors are mapped at this address and are nothing else; the slot in use is erased only
+        // when the one after next is begun, and no reader of this slice lives that long.
         let store = unsafe { core::slice::from_raw_parts(STORE_AT as *const u8, STORE_LENGTH) };
         store.get(at..at.checked_add(table.length)?)
     }

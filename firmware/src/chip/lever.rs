@@ -1,4 +1,5 @@
-//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say. This module owns the timer.
+//! The lever's STEP and DIR, from TIM1: which of its periods have a pulse is [`Steps`]' to say. This module owns the
+//! timer.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicI32, AtomicU32, Ordering::Relaxed};
 
@@ -17,7 +18,6 @@ use tactus_core::rig::steps::{BASE_HZ, Steps};
 use crate::board::{Named, held};
 use crate::{board, chip};
 
-/// The timer counts at 2 MHz.
 const PRESCALER: u16 = 83;
 const PERIOD: u16 = (2_000_000 / BASE_HZ) as u16;
 static CORE_HZ: AtomicU32 = AtomicU32::new(168_000_000);
@@ -31,7 +31,6 @@ static RATE: AtomicI32 = AtomicI32::new(0);
 static MADE: AtomicI32 = AtomicI32::new(0);
 static STEPS: Mutex<CriticalSectionRawMutex, Cell<Steps>> = Mutex::new(Cell::new(Steps::new()));
 
-/// The lever's driver.
 pub(crate) struct Lever {
     enable: Output<'static>,
     enabled: Instant,
@@ -41,7 +40,6 @@ pub(crate) struct Lever {
 }
 
 impl Lever {
-    /// Takes the pins: no current, no steps.
     pub(crate) fn new(pins: board::Lever) -> Self {
         let step = PwmPin::new(pins.step, OutputType::PushPull);
         rcc::enable_and_reset::<TIM1>();
@@ -69,13 +67,12 @@ impl Lever {
         }
     }
 
-    /// Steps made so far, downwards positive.
     pub(crate) fn steps(&self) -> i32 {
         MADE.load(Relaxed)
     }
 
-    /// Gives the motor current, or takes it away, and steps at this rate from the next period on; 10 ms after it got current
-    /// at the earliest, for which this is to be called again.
+    /// Gives the motor current, or takes it away, and steps at this rate from the next period on; 10 ms after it got
+    /// current at the earliest, for which this is to be called again.
     pub(crate) fn drive(&mut self, enabled: bool, rate: i32) {
         if enabled && self.enable.is_set_low() {
             self.enabled = Instant::now();
@@ -130,8 +127,8 @@ pub(crate) fn slow_clock() {
     REGISTERS.egr().write(|w| w.set_ug(true));
 }
 
-/// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made. For
-/// when nothing else works any more.
+/// Steps upwards, without interrupts, until `done` says so; it is asked before every step and told how many were made.
+/// For when nothing else works any more.
 pub(crate) fn lift_by_hand(mut done: impl FnMut(u32) -> bool) {
     REGISTERS.dier().write(|w| w.set_uie(false));
     REGISTERS.ccr(0).write(|w| w.set_ccr(0));

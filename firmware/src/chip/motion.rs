@@ -1,7 +1,7 @@
 //! The bus of the handheld's sensor of motion: SPI4 with its pins and its chip select, which this module owns wholly.
 //!
-//! A reading takes 0.15 ms of each 10 ms, and the start-up list 2 ms at once: its task waits for the bytes, and everything that is
-//! urgent interrupts it.
+//! A reading takes 0.15 ms of each 10 ms, and the start-up list 2 ms at once: its task waits for the bytes, and
+//! everything that is urgent interrupts it.
 use core::mem::ManuallyDrop;
 
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};
@@ -16,19 +16,16 @@ use tactus_core::sensor::paa5100je::CLOCK_HZ;
 use crate::board::{self, held};
 use crate::chip::{spi, wait_cycles};
 
-/// The bus: 84 MHz / 64.
 const DIVIDER: Br = Br::DIV64;
 const SPI_HZ: u32 = 84_000_000 / 64;
 const _: () = assert!(SPI_HZ <= CLOCK_HZ);
 /// Cycles of the core, 168 MHz, in a byte and in a us.
 const BYTE_CYCLES: u32 = 8 * (168_000_000 / SPI_HZ);
 const US_CYCLES: u32 = 168;
-/// Looks for a byte that is late.
 const LOOKS: u32 = 32;
 /// Alternate function of SPI4's pins (data sheet, table 12).
 const SPI4_FUNCTION: u8 = 5;
 
-/// The bus.
 pub(crate) struct MotionBus {
     _spi: Peri<'static, peripherals::SPI4>,
     _pins: [ManuallyDrop<Flex<'static>>; 3],
@@ -36,7 +33,6 @@ pub(crate) struct MotionBus {
 }
 
 impl MotionBus {
-    /// Takes the bus; the select is high.
     pub(crate) fn new(pins: board::Motion) -> Self {
         let mut select = held(pins.select);
         select.set_high();
@@ -57,7 +53,6 @@ impl MotionBus {
     }
 }
 
-/// Sets the bus up: mode 3.
 fn restart() {
     rcc::enable_and_reset::<peripherals::SPI4>();
     let mut control = Cr1::default();

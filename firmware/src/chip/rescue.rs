@@ -16,9 +16,7 @@ use super::{lever, watchdog};
 use crate::board::{self, Named, held};
 
 const MAGIC: u32 = 0x7ac7_1a57;
-/// Bytes of the last words.
 const WORDS: usize = 120;
-/// Callers that the last words can hold.
 const CALLERS: usize = 10;
 
 /// Last words that survive a reset; RAM that the start-up code leaves alone. Every bit pattern is a value.
@@ -49,8 +47,8 @@ pub(crate) fn reset_cause() -> (Reset, Option<Text>) {
     } else {
         Reset::Other
     };
-    // SAFETY: no other code uses it before interrupts are on or after they are off. Until the magic number says that it was
-    // written there is no reference to what is in it.
+    // SAFETY: no other code uses it before interrupts are on or after they are off. Until the magic number says that it
+    // was written there is no reference to what is in it.
     let said = unsafe {
         let at = addr_of_mut!(LAST_WORDS).cast::<LastWords>();
         let magic = addr_of_mut!((*at).magic);
@@ -81,8 +79,8 @@ pub(crate) fn remember(text: &str) {
     });
 }
 
-/// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing here
-/// needs an interrupt, memory or another task.
+/// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing
+/// here needs an interrupt, memory or another task.
 pub(crate) fn give_up(why: &str) -> ! {
     cortex_m::interrupt::disable();
     remember(why);
@@ -110,7 +108,8 @@ pub(crate) fn give_up(why: &str) -> ! {
     SCB::sys_reset()
 }
 
-/// Stops a start that cannot be completed: no motor gets current, the red LED is on. To be called before a motor could move.
+/// Stops a start that cannot be completed: no motor gets current, the red LED is on. To be called before a motor could
+/// move.
 pub(crate) fn refuse(why: &str) -> ! {
     cortex_m::interrupt::disable();
     defmt::error!("not started: {=str}", why);
@@ -129,8 +128,8 @@ pub(crate) fn refuse(why: &str) -> ! {
     }
 }
 
-/// Guards the end of the stack: nobody may use the memory between it and the variables. Who does so gets a hard fault, and has
-/// all of the guard as stack for what comes then, as the MPU is not for hard faults.
+/// Guards the end of the stack: nobody may use the memory between it and the variables. Who does so gets a hard fault,
+/// and has all of the guard as stack for what comes then, as the MPU is not for hard faults.
 pub(crate) fn guard_stack() {
     unsafe extern "C" {
         static __stack_guard: u32;
@@ -152,8 +151,8 @@ pub(crate) fn guard_stack() {
     cortex_m::asm::isb();
 }
 
-/// Says where from, and not what: the sentences and places of all panics would take 10 KB of flash. `addr2line` and the ELF
-/// know the lines.
+/// Says where from, and not what: the sentences and places of all panics would take 10 KB of flash. `addr2line` and the
+/// ELF know the lines.
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
     let mut text: String<WORDS> = String::new();
@@ -162,7 +161,8 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     give_up(&text)
 }
 
-/// Writes an address behind a text, as far as there is space. What formats numbers of any kind would take 1 KB of flash.
+/// Writes an address behind a text, as far as there is space. What formats numbers of any kind would take 1 KB of
+/// flash.
 fn address(text: &mut String<WORDS>, at: u32) {
     let _ = text.push_str(" 0x");
     let digits = (35 - (at | 1).leading_zeros()) / 4;
@@ -172,7 +172,8 @@ fn address(text: &mut String<WORDS>, at: u32) {
     }
 }
 
-/// Where functions on the stack return to, the last one first. What looks like it and is left over of others is among them.
+/// Where functions on the stack return to, the last one first. What looks like it and is left over of others is among
+/// them.
 fn callers(mut each: impl FnMut(usize)) {
     unsafe extern "C" {
         static __stext: u32;

@@ -15,7 +15,6 @@ pub(super) struct Select {
 }
 
 impl Select {
-    /// It is high.
     pub(super) fn new(pin: Peri<'static, AnyPin>) -> Self {
         let (port, mask) = (pin.block(), 1 << pin.pin());
         let mut pin = held(pin);
@@ -28,7 +27,6 @@ impl Select {
         }
     }
 
-    /// By the register that leaves the port's other pins alone.
     pub(super) fn set(&self, low: bool) {
         let mask = if low { self.mask << 16 } else { self.mask };
         self.port.bsrr().write_value(Bsrr(mask));

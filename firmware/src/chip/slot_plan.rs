@@ -7,10 +7,9 @@ use tactus_core::sensor::{FingerName, FingerParts, SLOWEST_HZ};
 pub(super) const TIMER_HZ: u32 = 84_000_000;
 /// Ticks of the timer in a us; the core makes two cycles in each.
 const US_TICKS: u32 = TIMER_HZ / 1_000_000;
-/// A transaction may end so much later than its bytes take, us: by other interrupts, and while they are off. Later, it would
-/// leave less than the gap before the next one, or its sample would not be where it should be in time.
+/// A transaction may end so much later than its bytes take, us: by other interrupts, and while they are off. Later, it
+/// would leave less than the gap before the next one, or its sample would not be where it should be in time.
 const SLACK_US: u32 = 7;
-/// Chip selects: the board has two.
 pub(super) const SELECTS: usize = 2;
 
 /// The clock of a bus, by the power of two that it is divided by, less one.
@@ -18,7 +17,6 @@ pub(super) const SELECTS: usize = 2;
 pub(super) struct Clock(pub(super) u8);
 
 impl Clock {
-    /// The fastest one up to this, Hz.
     pub(super) const fn up_to(hz: u32) -> Self {
         let mut divider = 0;
         while TIMER_HZ >> (divider + 1) > hz {
@@ -48,7 +46,6 @@ impl Clock {
         TIMER_HZ >> (self.0 + 1)
     }
 
-    /// Ticks of the timer in a byte.
     pub(super) const fn byte_ticks(self) -> u32 {
         8 << (self.0 + 1)
     }
@@ -64,7 +61,6 @@ pub(super) struct Step {
     /// Time for the bytes, with the slack, and for the gap behind them.
     pub(super) ticks: u32,
     pub(super) gap_ticks: u32,
-    /// What goes out, in frames.
     pub(super) out: [u16; FRAMES],
     pub(super) port: u8,
     /// Bytes, and the index of the first one that comes in as the answer.
@@ -113,7 +109,6 @@ impl Step {
     }
 }
 
-/// The slots of a finger.
 #[repr(C)]
 pub(super) struct Plan {
     /// Each slot: its transactions, and how many of them there are.
@@ -168,8 +163,8 @@ impl Plan {
     }
 }
 
-/// The transactions of each slot of each finger, in RAM: without the data cache (see `board`) each constant that is read
-/// from flash takes six cycles more, and a slot reads twenty of them. Board tests look for this name.
+/// The transactions of each slot of each finger, in RAM: without the data cache (see `board`) each constant that is
+/// read from flash takes six cycles more, and a slot reads twenty of them. Board tests look for this name.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".data.SLOT_PLAN")]
 pub(super) static SLOT_PLAN: [Plan; FingerName::ALL.len()] = [

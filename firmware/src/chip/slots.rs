@@ -1,9 +1,9 @@
 //! The sensor's slots: SPI1 with its pins, the chip selects, and the timer TIM2, which this module owns wholly.
 //!
-//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`FingerParts::slots`]): the timer's interrupts
-//! begin a transaction, the bus's interrupt ends each of its frames, and nobody waits for either. What does not end in its time
-//! is given up when the timer comes next. embassy's driver of the bus has no transfers by its interrupt: it spins for each
-//! byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
+//! The timer begins a slot every 227 us. What is done in it is the finger's data ([`FingerParts::slots`]): the timer's
+//! interrupts begin a transaction, the bus's interrupt ends each of its frames, and nobody waits for either. What does
+//! not end in its time is given up when the timer comes next. embassy's driver of the bus has no transfers by its
+//! interrupt: it spins for each byte, or takes two DMA streams with an interrupt each for the two bytes of a word.
 use core::cell::UnsafeCell;
 use core::mem::ManuallyDrop;
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
@@ -26,7 +26,6 @@ use crate::chip::{self, finger, spi};
 
 /// A sensor word; `None` is a damaged or missing one.
 pub(crate) type Word = Option<Pressure>;
-/// Words on their way to the servo: 29 ms.
 pub(crate) const WORDS: usize = 128;
 
 /// 84 MHz / 19 091: 4399.98 slots a second.
@@ -46,14 +45,12 @@ pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 /// A frame did not end in three times its time; the bus was set up anew.
 pub(crate) struct NoFrame;
 
-/// The bus and its selects.
 pub(crate) struct Bus {
     _spi: Peri<'static, peripherals::SPI1>,
     _pins: [ManuallyDrop<Flex<'static>>; 3],
     selects: [Select; SELECTS],
     control: Cr1,
     clock: Clock,
-    /// It was told to say when a frame is over.
     interrupts: bool,
 }
 
@@ -103,7 +100,6 @@ impl Bus {
         self.restart();
     }
 
-    /// Has the bus say when each frame of these slots is over.
     fn begin(&mut self, plan: &Plan) {
         self.interrupts = true;
         self.control
@@ -113,7 +109,8 @@ impl Bus {
         self.set_clock(plan.clock);
     }
 
-    /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no word.
+    /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no
+    /// word.
     fn restart(&mut self) {
         for select in &self.selects {
             select.set(false);
@@ -137,8 +134,8 @@ impl Bus {
             .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
     }
 
-    /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes the place of
-    /// `bytes`.
+    /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes
+    /// the place of `bytes`.
     pub(crate) fn transact(
         &mut self,
         port: Option<&Port>,
@@ -171,7 +168,6 @@ impl Bus {
     }
 }
 
-/// What the two interrupts do.
 struct Slots {
     bus: Bus,
     _timer: Peri<'static, peripherals::TIM2>,
@@ -180,7 +176,6 @@ struct Slots {
     words: Producer<'static, Word>,
     /// Words were lost: who takes them sees where, as the next one is no good.
     gap: bool,
-    /// Slots that have begun.
     begun: u32,
     /// What is left to do of the slot, the transaction under way first.
     left: &'static [Step],
@@ -192,11 +187,10 @@ struct Slots {
     answer: Answer,
 }
 
-/// Where the two interrupts find it.
 struct Shared(UnsafeCell<Option<Slots>>);
 
-// SAFETY: written once, before either interrupt is enabled. Afterwards the handlers of the two alone use it, which have one
-// priority: neither interrupts the other.
+// SAFETY: written once, before either interrupt is enabled. Afterwards the handlers of the two alone use it, which have
+// one priority: neither interrupts the other.
 unsafe impl Sync for Shared {}
 
 static SHARED: Shared = Shared(UnsafeCell::new(None));
@@ -227,7 +221,6 @@ pub(crate) fn unreadable() -> u32 {
 /// Gravity along the finger, see [`AnyFinger::gravity`]; beyond all of it before it is known.
 static GRAVITY: AtomicI32 = AtomicI32::new(i32::MIN);
 
-/// Gravity along the finger, counts of P_AC.
 pub(crate) fn gravity() -> Option<f32> {
     let parts = GRAVITY.load(Relaxed);
     (parts > i32::MIN).then_some(parts as f32 / GRAVITY_PARTS)
@@ -310,7 +303,6 @@ impl Slots {
         1 << u32::from(self.plan.wide)
     }
 
-    /// A slot begins.
     #[inline(always)]
     fn begin(&mut self) {
         if let [step, ..] = self.left {
@@ -377,7 +369,6 @@ impl Slots {
         }
     }
 
-    /// A frame is over.
     #[inline(always)]
     fn frame(&mut self) {
         let came_in = spi::received(SPI1).to_be_bytes();
@@ -414,7 +405,6 @@ impl Slots {
         self.lose();
     }
 
-    /// The slot is over, and has its answer.
     #[inline(always)]
     fn word(&mut self) {
         let word = self.finger.decode(self.begun.wrapping_sub(1), &self.answer);
@@ -441,7 +431,6 @@ impl Slots {
         self.lose();
     }
 
-    /// The slot is over, without a word.
     fn lose(&mut self) {
         self.left = &[];
         self.sent = 0;

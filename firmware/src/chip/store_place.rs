@@ -8,9 +8,6 @@ pub(super) const STORE_LENGTH: usize = 256 * 1024;
 const OFFSET: u32 = (STORE_AT - FLASH_BASE) as u32;
 
 /// The place in the flash of a place in the store.
-///
-/// # Errors
-/// It ends beyond the store.
 pub(super) fn within(at: u32, length: usize) -> Result<u32, Error> {
     let end = (at as usize).checked_add(length);
     match end.is_some_and(|end| end <= STORE_LENGTH) {

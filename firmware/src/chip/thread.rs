@@ -1,5 +1,6 @@
-//! The executor of thread mode. embassy's own looks for work two times after each interrupt: an interrupt that ends sets the event that
-//! the next `wfe` would wait for. The sensor's slots alone are 18 interrupts a millisecond, which took 0.4 % of the core.
+//! The executor of thread mode. embassy's own looks for work two times after each interrupt: an interrupt that ends
+//! sets the event that the next `wfe` would wait for. The sensor's slots alone are 18 interrupts a millisecond, which
+//! took 0.4 % of the core.
 use cortex_m::interrupt::{InterruptNumber as _, disable, enable};
 use cortex_m::peripheral::NVIC;
 use embassy_executor::{Spawner, raw};

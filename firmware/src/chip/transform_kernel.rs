@@ -4,8 +4,8 @@ use core::arch::global_asm;
 
 use tactus_core::dsp::{Angles, Complex32, FRAME, Reals};
 
-// microfft's transform (decimation in time), two of its stages at a time and the first two or three together: the same products
-// and sums, each rounded, with half of the loads and stores.
+// microfft's transform (decimation in time), two of its stages at a time and the first two or three together: the same
+// products and sums, each rounded, with half of the loads and stores.
 global_asm!(
     ".fpu fpv4-sp-d16",
     // b, turned by an angle, added to a and subtracted from it
@@ -219,7 +219,8 @@ unsafe extern "C" {
     );
 }
 
-/// The places of `N` values, a power of 2, whose bits are another's when reversed: pairs that a transform begins by swapping.
+/// The places of `N` values, a power of 2, whose bits are another's when reversed: pairs that a transform begins by
+/// swapping.
 #[expect(
     clippy::indexing_slicing,
     reason = "the compiler runs it, and has no iterators"
@@ -266,7 +267,6 @@ fn recombine(angles: &Angles, values: &mut [Complex32; FRAME / 16]) {
     }
 }
 
-/// [`Kernels::transform`](tactus_core::dsp::Kernels::transform).
 pub(super) fn transform(angles: &Angles, values: &mut [Complex32]) {
     let many = values.len();
     let places: &[[u8; 2]] = match many {
@@ -287,7 +287,6 @@ pub(super) fn transform(angles: &Angles, values: &mut [Complex32]) {
     };
 }
 
-/// [`Kernels::transform_reals`](tactus_core::dsp::Kernels::transform_reals).
 pub(super) fn transform_reals<'r>(
     angles: &Angles,
     reals: &'r mut Reals,

@@ -1,5 +1,5 @@
-//! The watchdog, which this module owns: it is started before the peripherals are handed out, and petted until the chip starts
-//! anew, whatever has become of the tasks.
+//! The watchdog, which this module owns: it is started before the peripherals are handed out, and petted until the chip
+//! starts anew, whatever has become of the tasks.
 use embassy_stm32::pac::IWDG;
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};
 
@@ -20,8 +20,9 @@ fn set(prescaler: Pr, reload: u16) {
     IWDG.kr().write(|w| w.set_key(Key::ENABLE));
     IWDG.pr().write(|w| w.set_pr(prescaler));
     IWDG.rlr().write(|w| w.set_rl(reload));
-    // They take five of its cycles to arrive, 0.3 ms at most, and its oscillator has to start. Before that a reload would
-    // load 4 s, and what is set next would be ignored. By 16 MHz this is at most some 10 ms, by 168 MHz more than 0.3.
+    // They take five of its cycles to arrive, 0.3 ms at most, and its oscillator has to start. Before that a reload
+    // would load 4 s, and what is set next would be ignored. By 16 MHz this is at most some 10 ms, by 168 MHz more than
+    // 0.3.
     for _ in 0..20_000 {
         if IWDG.sr().read().0 == 0 {
             break;

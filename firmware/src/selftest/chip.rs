@@ -1,51 +1,44 @@
-//! What both self-tests ask of the chip itself.
+//! Questions about the chip itself.
 use cortex_m::peripheral::DWT;
 use embassy_stm32::pac::{FLASH, GPIOA, RCC, gpio::vals::Idr, rcc::vals::Sw};
 use embassy_time::{Duration, block_for};
 use tactus_core::rig::skin::SkinCare;
 use tactus_core::store::StoreError;
+use tactus_core::wire::bringup::ChipSeen;
 
-use super::account::CORE_HZ;
 use crate::board;
 use crate::chip::{flash, watchdog};
 
+const CORE_HZ: u32 = 168_000_000;
 const WATCHDOG_US: u32 = 100_000;
 
-/// The chip's clocks, and the pin that bank 2 of the flash depends on.
-pub(super) struct Clock {
-    pub(super) khz: u32,
-    pub(super) external: bool,
-    pub(super) locked: bool,
-    pub(super) pa12: bool,
+/// So long, by the core's cycle counter; a look at it takes a cycle and more, which is the bound if it does not run.
+pub(super) fn wait_us(us: u32) {
+    let (began, cycles) = (DWT::cycle_count(), us * (CORE_HZ / 1_000_000));
+    let _ = (0..cycles).find(|_| DWT::cycle_count().wrapping_sub(began) >= cycles);
 }
 
-pub(super) fn clock() -> Clock {
+/// The chip's clocks, the pin that bank 2 of the flash depends on, and the option bytes' level of the brown-out reset.
+pub(super) fn chip() -> ChipSeen {
     let began = DWT::cycle_count();
     block_for(Duration::from_millis(10));
     let khz = DWT::cycle_count().wrapping_sub(began) / 10;
     let control = RCC.cr().read();
-    Clock {
+    ChipSeen {
         khz,
-        external: control.hserdy(),
+        external: control.hserdy() && board::has_clock(),
         locked: control.pllrdy() && RCC.cfgr().read().sws() == Sw::PLL1_P,
         pa12: GPIOA.idr().read().idr(12) == Idr::HIGH,
+        brown_out: FLASH.optcr().read().bor_lev(),
     }
 }
 
-/// The level of the brown-out reset in the option bytes: 0 is the highest voltage, 3 is off.
-pub(super) fn bor_level() -> u8 {
-    FLASH.optcr().read().bor_lev()
-}
-
-/// Writes the skin's record as it is and reads it again: nothing else is changed, and nothing at all where it is not read. The skin
-/// before and after, and whether there is a table.
-pub(super) async fn rewrite(
-    store: &mut flash::Storage,
-) -> Result<(SkinCare, SkinCare, bool), StoreError> {
+/// Writes the skin's record as it is and reads it again: nothing else is changed, and nothing at all where it is not
+/// read. The skin before and after.
+pub(super) async fn rewrite(store: &mut flash::Storage) -> Result<[SkinCare; 2], StoreError> {
     let before = store.skin().await?;
     store.set_skin(&before).await?;
-    let after = store.skin().await?;
-    Ok((before, after, store.table().is_some()))
+    Ok([before, store.skin().await?])
 }
 
 /// Hangs with the watchdog on, for longer than it waits.

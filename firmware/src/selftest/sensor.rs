@@ -1,4 +1,5 @@
-//! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches it.
+//! The sensor on its bus: who it is, whether its words come whole and in time, and what it measures when nobody touches
+//! it.
 use embassy_time::{Duration, Instant, Timer};
 use tactus_core::sensor::biotac::{IdentityBytes, keep};
 use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
@@ -7,12 +8,11 @@ use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerName};
 use tactus_core::wire::bringup::{Stopped, limits};
 use tactus_core::wire::{Reset, Text, text};
 
-use super::account::{Account, wait_us};
+use super::chip::wait_us;
 use crate::board;
 use crate::chip::finger;
 use crate::chip::slots::Bus;
 
-/// The slot that gives P_DC.
 const PDC: u32 = 1;
 /// A slot that begins later than this leaves a BioTac less than its 50 us before the next one.
 const LATE_US: u64 = 100;
@@ -27,7 +27,6 @@ const ASKED_MS: u32 = 30_000;
 /// P_DC says nothing any more after so many damaged words in a row.
 const MOST_DAMAGED: u32 = 10;
 
-/// The bus of the sensor, used directly.
 pub(super) struct Sensor {
     bus: Bus,
     finger: AnyFinger,
@@ -114,37 +113,30 @@ impl Sensor {
                     }
                     each(pressure);
                 }
-                Err(why) => {
-                    match why.kind() {
-                        Some(BadWord::Garbled) => second.garbled += 1,
-                        Some(BadWord::Refused) => second.refused += 1,
-                        Some(BadWord::Silent) => second.silent += 1,
-                        None => {}
-                    }
-                    second.why = Some(why);
-                }
+                Err(why) => match why.kind() {
+                    Some(BadWord::Garbled) => second.garbled += 1,
+                    Some(BadWord::Refused) => second.refused += 1,
+                    Some(BadWord::Silent) => second.silent += 1,
+                    None => {}
+                },
             }
         }
         second
     }
 }
 
-/// What a second of words said.
 #[derive(Default)]
 pub(super) struct Second {
     pub(super) words: u32,
     pub(super) garbled: u32,
     pub(super) refused: u32,
     pub(super) silent: u32,
-    /// What was wrong with the last one of these.
-    why: Option<FingerError>,
     pub(super) late: u32,
     pub(super) last: [u8; 2],
     pub(super) pac: Spread,
     pub(super) pdc: Spread,
 }
 
-/// Mean and standard deviation of counts.
 #[derive(Default)]
 pub(super) struct Spread {
     number: f32,
@@ -178,9 +170,8 @@ impl Spread {
 
 /// P_DC against that of the finger that nobody touches, asked for every millisecond while a motor may press it.
 pub(super) struct Touch {
-    sensor: Sensor,
+    pub(super) sensor: Sensor,
     rest: f32,
-    /// Mean over some 8 ms.
     counts: f32,
     damaged: u32,
 }
@@ -194,11 +185,6 @@ impl Touch {
             counts: rest,
             damaged: 0,
         }
-    }
-
-    /// The sensor, for what else it says; and what P_DC is while nobody touches it, when that was measured.
-    pub(super) fn sensor(&mut self) -> &mut Sensor {
-        &mut self.sensor
     }
 
     /// Nobody touches the finger now, and this is its P_DC.
@@ -243,61 +229,4 @@ impl Touch {
         }
         Err(Stopped::NobodySqueezed)
     }
-}
-
-pub(super) async fn sensor(pins: board::Sensor, reset: Reset, account: &mut Account) -> Touch {
-    let mut sensor = Sensor::new(pins, reset).await;
-    let (answers, who) = match sensor.identity() {
-        Ok(who) => (true, who),
-        Err(why) => (false, why),
-    };
-    account.check(
-        answers,
-        "sensor identity",
-        who.as_str(),
-        "SCK PA5, MISO PA6, MOSI PB5, CS PD14, of a second part PD15, 3.3 V and ground",
-    );
-
-    let second = sensor.second(|_| ()).await;
-    let Second {
-        words,
-        garbled,
-        refused,
-        silent,
-        late,
-        ..
-    } = second;
-    let well = second.why.is_none() && late == 0;
-    let why = second.why.map_or_else(Text::new, text);
-    account.check(
-        well,
-        "sensor words",
-        format_args!(
-            "words: {words}, {garbled} garbled, error frames: {refused}, {silent} silent, {late} late. {why}"
-        ),
-        "Shorten the cable and check the pins named above",
-    );
-    let at_rest = finger::parts().model.at_rest;
-    let mut rests = |name, is: f32, (least, most): (f32, f32), remedy| {
-        let within = (least..=most).contains(&is);
-        account.check(
-            within,
-            name,
-            format_args!("{is:.2} counts; {least:.1} to {most:.1} are right"),
-            remedy,
-        );
-    };
-    rests(
-        "P_AC noise",
-        second.pac.rms(),
-        at_rest.pac_noise_counts,
-        "Less: the sensor does not convert. More: is the finger touched? Check its ground",
-    );
-    rests(
-        "P_DC",
-        second.pdc.mean(),
-        at_rest.pdc_counts,
-        "Keep off anything that presses it. Refill a BioTac as its manual says; trim an amplified cell to 1000 counts",
-    );
-    Touch::new(sensor, second.pdc.mean())
 }

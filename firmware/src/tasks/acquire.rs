@@ -9,7 +9,6 @@ use crate::board;
 use crate::chip::finger;
 use crate::chip::slots::{self, Bus, Word};
 
-/// What is said while no finger answers.
 const NOBODY: &str = "no finger answers: check its power, its cable and its chip select";
 /// From one attempt to the next, ms; and attempts from one word about it to the next.
 const AGAIN_MS: u64 = 500;
@@ -34,8 +33,9 @@ pub(crate) async fn acquire(
     }
 }
 
-/// Looks for a finger until there is one. Without slots the rig knows that its sensor is silent; the host is told why. One that took
-/// noise for a command answers only when it was left alone for a while: after some looks these are as far apart.
+/// Looks for a finger until there is one. Without slots the rig knows that its sensor is silent; the host is told why.
+/// One that took noise for a command answers only when it was left alone for a while: after some looks these are as far
+/// apart.
 async fn wait_for_it(bus: &mut Bus) {
     const SOON: u32 = 10;
     let mut looks = 0;
@@ -50,8 +50,9 @@ async fn wait_for_it(bus: &mut Bus) {
     }
 }
 
-/// Stops the slots for a while when nothing readable has come for half a minute: a sensor that took noise for a command may be deaf
-/// as long as it is clocked. Whoever plugs in a loose cable is done by then. The rig has stood still since the first 10 ms of it.
+/// Stops the slots for a while when nothing readable has come for half a minute: a sensor that took noise for a command
+/// may be deaf as long as it is clocked. Whoever plugs in a loose cable is done by then. The rig has stood still since
+/// the first 10 ms of it.
 async fn leave_alone(deaf_ms: u32) {
     const LOOK_S: u32 = 30;
     /// All but those of half a second: in fewer a handheld sleeps.
@@ -67,8 +68,8 @@ async fn leave_alone(deaf_ms: u32) {
     }
 }
 
-/// Starts the finger's parts, again and again until each of them answers as it must. Without slots the rig knows that its sensor
-/// is silent; the host is told which part it is.
+/// Starts the finger's parts, again and again until each of them answers as it must. Without slots the rig knows that
+/// its sensor is silent; the host is told which part it is.
 async fn start(bus: &mut Bus) {
     let mut attempts = 0;
     let mut told = None;

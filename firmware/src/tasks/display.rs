@@ -20,12 +20,12 @@ bind_interrupts!(struct Irqs {
 
 /// Whether [`NEXT`] is to be shown, or the display is to be off.
 static SHOW: Signal<CriticalSectionRawMutex, bool> = Signal::new();
-/// What is to be shown next. It is copied with interrupts on: a signal would move its 1 KB with them off, and for longer
-/// than a sensor slot may be late.
+/// What is to be shown next. It is copied with interrupts on: a signal would move its 1 KB with them off, and for
+/// longer than a sensor slot may be late.
 static NEXT: Mutex<CriticalSectionRawMutex, Picture> = Mutex::new(Picture::new());
 
-/// Has a picture shown; `None` switches the display off. A picture that comes too early takes the place of the one before
-/// it.
+/// Has a picture shown; `None` switches the display off. A picture that comes too early takes the place of the one
+/// before it.
 pub(crate) fn picture(picture: Option<&Picture>) {
     if let Some(picture) = picture {
         // who shows it copies it at once, and runs where those run who call this: nobody else has it now
@@ -72,15 +72,12 @@ const AREA: [u8; 7] = [
 
 type Bus = I2c<'static, Async, Master>;
 
-/// The picture that was sent last, as it goes over the bus.
 struct Sent {
     bytes: [u8; 1 + WIDTH * HEIGHT / 8],
-    /// Whether there is one.
     any: bool,
 }
 
 impl Sent {
-    /// Takes a picture, and says whether it differs.
     fn take(&mut self, picture: &Picture) -> bool {
         let [_, points @ ..] = &mut self.bytes;
         let differs = !self.any || points != picture.bytes();

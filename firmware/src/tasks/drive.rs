@@ -1,6 +1,7 @@
 //! What the probe and the link say to the task that drives the rig a thousand times a second, and what they hear of it:
 //! `servo`, or `arm` where somebody else's arm moves the finger.
 use core::cell::Cell;
+use core::mem;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
@@ -10,16 +11,21 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Ticker, with_timeout};
+use heapless::spsc::{Consumer, Producer};
 use tactus_core::probe::RigState;
-use tactus_core::probe::servo_rig::RigCommand;
-use tactus_core::rig::Refused;
+use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo};
 use tactus_core::rig::calibration::RigCalibration;
+use tactus_core::rig::pins::{Inputs, MAX_WORDS, Outputs};
+use tactus_core::rig::{Ended, Refused};
 use tactus_core::sensor::FingerName;
-use tactus_core::wire::ArmReport;
+use tactus_core::wire::{ArmReport, Event};
 
 use super::link::Body;
+use super::outbox::{STREAM, tell};
+use crate::chip::slots::{self, Word};
+use crate::chip::{rescue, watchdog};
 
-/// Runs the task that drives the rig, and nothing else.
 pub(crate) static SERVO: InterruptExecutor = InterruptExecutor::new();
 
 #[interrupt]
@@ -31,25 +37,21 @@ fn UART5() {
 /// Samples on their way to the features: a quarter of a second.
 pub(crate) const SAMPLES: usize = 256;
 
-pub(super) static COMMAND: Signal<CriticalSectionRawMutex, RigCommand> = Signal::new();
-pub(super) static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
-/// A slide has ended; its finger is being lifted.
-pub(super) static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// Stop and lift, whatever is being done.
+static COMMAND: Signal<CriticalSectionRawMutex, RigCommand> = Signal::new();
+static ANSWER: Signal<CriticalSectionRawMutex, Result<(), Refused>> = Signal::new();
+static ENDED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 pub(super) static STOP: AtomicBool = AtomicBool::new(false);
-/// No more of the slide is needed.
 pub(super) static END_SLIDE: AtomicBool = AtomicBool::new(false);
 /// The session was told to stop: between two movements the rig has nothing to stop.
 static STOPPED: AtomicBool = AtomicBool::new(false);
-pub(super) static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
+static STATE: Mutex<CriticalSectionRawMutex, Cell<RigState>> =
     Mutex::new(Cell::new(RigState::parked(unmeasured(FingerName::Biotac))));
 /// Samples dropped because the queue to the probe was full, or without a current of their own.
-pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
+pub(super) static LOST: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the tasks in thread mode have checked in.
 static SILENT_MS: AtomicU32 = AtomicU32::new(0);
 /// Milliseconds since the session made progress, or [`WAITS`].
 static STUCK_MS: AtomicU32 = AtomicU32::new(0);
-/// It waits for the host, and may do so for ever.
 const WAITS: u32 = u32::MAX;
 
 /// Words of an arm between two ticks: it says one in 50 ms.
@@ -57,68 +59,23 @@ pub(super) const REPORTS: usize = 8;
 /// What the arm has said; what has no room is said again.
 pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
-/// The reference rig's constants, until measured ones are read from the store.
 pub(crate) const fn unmeasured(finger: FingerName) -> RigCalibration {
-    RigCalibration {
-        pressure: finger.parts().model.calibration,
-        unloaded_a: (0.037, 0.0),
-        newton_per_ampere: 16.4,
-        date: 0,
-        air_known: false,
-        turned: 0,
-        serial: [0; 16],
-    }
+    RigCalibration::unmeasured(&finger.parts().model)
 }
 
-/// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid, is
-/// half of it.
+/// Tasks that are silent for longer hang: the longest that they compute, the choice among the actions of a whole grid,
+/// is half of it.
 const HUNG_MS: u32 = 2000;
 /// A session without progress for longer waits for something that does not come, such as an interrupt of the flash. All
 /// that it does without the rig, the sectors of the store erased and written, takes less than 15 s.
 const STUCK_LIMIT_MS: u32 = 30_000;
 
-/// Gives a command and waits for the answer. For one task at a time.
-pub(crate) async fn command(command: RigCommand) -> Result<(), Refused> {
-    progress();
-    ANSWER.reset();
-    COMMAND.signal(command);
-    ANSWER.wait().await
-}
-
-/// Stops what is being done now.
-pub(crate) fn stop() {
-    STOP.store(true, Relaxed);
-}
-
-/// Ends the slide that is being made, if one is.
-pub(crate) fn end_slide() {
-    END_SLIDE.store(true, Relaxed);
-}
-
-/// Stops what is being done, and what would come after it until [`forget_stop`].
-pub(crate) fn stop_for_good() {
-    STOPPED.store(true, Relaxed);
-    stop();
-}
-
-/// Whether [`stop_for_good`] was called.
-pub(crate) fn is_stopped() -> bool {
-    STOPPED.load(Relaxed)
-}
-
-/// What was stopped is over.
 pub(crate) fn forget_stop() {
     STOPPED.store(false, Relaxed);
 }
 
-/// What the rig is doing.
 pub(crate) fn state() -> RigState {
     STATE.lock(Cell::get)
-}
-
-/// Waits for the end of a slide.
-pub(crate) async fn ended() {
-    ENDED.wait().await;
 }
 
 /// The tasks in thread mode are alive. Board tests break it by its name.
@@ -128,20 +85,19 @@ pub(crate) fn check_in() {
     SILENT_MS.store(0, Relaxed);
 }
 
-/// The session goes on with what it was asked for.
 pub(crate) fn progress() {
     STUCK_MS.store(0, Relaxed);
 }
 
-/// The session waits for a request.
 pub(crate) fn waits() {
     STUCK_MS.store(WAITS, Relaxed);
 }
 
-/// Another millisecond: why the tasks that the rig serves are taken for hung, if they are. Board tests break it by its name.
+/// Another millisecond: why the tasks that the rig serves are taken for hung, if they are. Board tests break it by its
+/// name.
 #[unsafe(export_name = "tactus_servo_tick")]
 #[inline(never)]
-pub(super) fn hung() -> Option<&'static str> {
+fn hung() -> Option<&'static str> {
     let silent_ms = SILENT_MS.fetch_add(1, Relaxed);
     // thread mode does not come between: the servo interrupts it
     let stuck_ms = match STUCK_MS.load(Relaxed) {
@@ -157,21 +113,159 @@ pub(super) fn hung() -> Option<&'static str> {
     }
 }
 
-/// The rig as the link asks it at any time.
-pub(crate) static BODY: Body = MOVED_BY_MOTORS;
-const MOVED_BY_MOTORS: Body = Body {
+pub(crate) const BODY: Body = Body {
     state,
-    stop: |all| if all { stop_for_good() } else { stop() },
+    stop: |all| {
+        if all {
+            STOPPED.store(true, Relaxed);
+        }
+        STOP.store(true, Relaxed);
+    },
     lost: || LOST.load(Relaxed),
     arm: |_| false,
 };
 
 /// The same where somebody else's arm moves the finger.
-pub(crate) static BODY_ON_ARM: Body = Body {
+pub(crate) const BODY_ON_ARM: Body = Body {
     arm: |report| {
         // what has no room is said again
         let _ = HEARD.try_send(report);
         true
     },
-    ..MOVED_BY_MOTORS
+    ..BODY
 };
+
+pub(crate) struct ServoHandle {
+    pub(crate) samples: Consumer<'static, Samples>,
+    pub(crate) has_stage: bool,
+}
+
+impl Servo for ServoHandle {
+    fn has_stage(&self) -> bool {
+        self.has_stage
+    }
+
+    async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
+        progress();
+        ANSWER.reset();
+        COMMAND.signal(command);
+        ANSWER.wait().await
+    }
+
+    async fn wait(&mut self) {
+        let _ = with_timeout(Duration::from_millis(LOOK_MS.into()), ENDED.wait()).await;
+        progress();
+    }
+
+    fn state(&self) -> RigState {
+        state()
+    }
+
+    fn samples(&mut self) -> Option<Samples> {
+        self.samples.dequeue()
+    }
+
+    fn gravity(&self) -> Option<f32> {
+        slots::gravity()
+    }
+
+    fn lost(&self) -> u32 {
+        let acquired = slots::LOST.load(Relaxed);
+        acquired.wrapping_add(LOST.load(Relaxed))
+    }
+
+    fn stop(&mut self) {
+        STOP.store(true, Relaxed);
+    }
+
+    fn end_slide(&mut self) {
+        END_SLIDE.store(true, Relaxed);
+    }
+
+    fn is_stopped(&self) -> bool {
+        STOPPED.load(Relaxed)
+    }
+
+    fn streams(&self) -> bool {
+        STREAM.load(Relaxed)
+    }
+
+    fn tell(&mut self, event: Event) {
+        tell(event);
+    }
+}
+
+/// What every tick of a rig begins and ends with: words in, samples and the rig's state out, and the watchdog.
+pub(super) struct Ticks {
+    words: Consumer<'static, Word>,
+    samples: Producer<'static, Samples>,
+    ticker: Ticker,
+    ended: Option<Ended>,
+    /// Why the watchdog is not petted any more once the rig is at rest.
+    pub(super) hung: Option<&'static str>,
+    remembered: bool,
+}
+
+impl Ticks {
+    pub(super) fn new(words: Consumer<'static, Word>, samples: Producer<'static, Samples>) -> Self {
+        Self {
+            words,
+            samples,
+            ticker: Ticker::every(Duration::from_millis(1)),
+            ended: None,
+            hung: None,
+            remembered: false,
+        }
+    }
+
+    pub(super) async fn next(&mut self) -> Inputs {
+        self.ticker.next().await;
+        // once hung, hung until the watchdog has done its work
+        self.hung = self.hung.or(hung());
+        let mut inputs = Inputs::default();
+        while inputs.words.len() < MAX_WORDS
+            && let Some(word) = self.words.dequeue()
+        {
+            // the loop ends before `words` is full
+            let _ = inputs.words.push(word);
+        }
+        inputs
+    }
+
+    pub(super) fn obey(&mut self, apply: impl FnOnce(RigCommand) -> Result<(), Refused>) {
+        if let Some(command) = COMMAND.try_take() {
+            self.ended = None;
+            ANSWER.signal(apply(command));
+        }
+    }
+
+    /// The tick is over: `ended` is the end of a movement in it, and `state` makes the rig's state of the last one.
+    pub(super) fn over(
+        &mut self,
+        outputs: &Outputs,
+        ended: Option<Ended>,
+        state: impl FnOnce(Option<Ended>) -> RigState,
+    ) {
+        Samples::of(outputs, |part| {
+            let many = part.pac.len() as u32;
+            if self.samples.enqueue(part).is_err() {
+                LOST.fetch_add(many, Relaxed);
+            }
+        });
+        if ended.is_some() {
+            self.ended = ended;
+            ENDED.signal(());
+        }
+        let state = state(self.ended);
+        STATE.lock(|cell| cell.set(state));
+        match self.hung {
+            Some(why) if state.at_rest => {
+                // once: the reset may come while it is written
+                if !mem::replace(&mut self.remembered, true) {
+                    rescue::remember(why);
+                }
+            }
+            _ => watchdog::pet(),
+        }
+    }
+}

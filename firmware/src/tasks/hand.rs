@@ -3,7 +3,7 @@ use core::cell::Cell;
 use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
-use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::gpio::{Input, OutputType, Pull};
 use embassy_stm32::peripherals;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
@@ -13,11 +13,11 @@ use embassy_time::{Duration, Instant, Ticker};
 use heapless::spsc::Consumer;
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
-use tactus_core::handheld::by_hand::{self, ByHand, Hand, Shown};
+use tactus_core::handheld::by_hand::{self, ByHand, Hand};
 use tactus_core::handheld::jobs::{self, Outcome};
 use tactus_core::handheld::{About, Handheld, Moved, Picture, Screen, TICKS_HZ, draw};
 use tactus_core::probe::seams::Events;
-use tactus_core::probe::{self, Memory, Probe, RigState, TableInUse};
+use tactus_core::probe::{self, Memory, Probe, RigState};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
 use tactus_core::sensor::paa5100je::{MotionFault, Paa5100je};
@@ -26,7 +26,7 @@ use tactus_core::wire::{Event, Reset, Text};
 
 use super::display;
 use super::level::OneLevel;
-use super::link::{BUSY, Body, HEARD, JOBS, TABLE};
+use super::link::{BUSY, Body, EventSink, HEARD, JOBS};
 use super::outbox::{self, STREAM};
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
@@ -37,13 +37,11 @@ use crate::chip::{KERNELS, finger};
 
 /// Ticks from one word in the log about sleep to the next.
 const SAY: u32 = 5 * TICKS_HZ;
-/// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest sector,
-/// 2 s, and to write 64 KB, 1.6 s.
+/// `hand` gets on at least this often, ms. The longest that it does is to turn a page of settings, to erase the largest
+/// sector, 2 s, and to write 64 KB, 1.6 s.
 const PATIENCE_MS: u32 = 10_000;
 
-/// How long the core has slept, us.
 static ASLEEP_US: AtomicU32 = AtomicU32::new(0);
-/// When `hand` got on last, ms.
 static PROGRESS_MS: AtomicU32 = AtomicU32::new(0);
 
 /// Sleeps for ever but for interrupts, and counts the time. With interrupts held off, the first one ends the sleep but
@@ -61,12 +59,10 @@ pub(crate) fn sleep() -> ! {
     }
 }
 
-/// `hand` gets on.
 fn progress() {
     PROGRESS_MS.store(Instant::now().as_millis() as u32, Relaxed);
 }
 
-/// Feeds the watchdog as long as `hand` gets on.
 #[embassy_executor::task]
 pub(crate) async fn watch() {
     let mut ticker = Ticker::every(Duration::from_millis(100));
@@ -133,7 +129,6 @@ impl Awake {
 
 type Buzzer = SimplePwm<'static, peripherals::TIM8>;
 
-/// Sounds a tone, or none.
 fn sound(buzzer: &mut Buzzer, tone: Option<u16>) {
     match tone {
         Some(hz) => {
@@ -146,14 +141,11 @@ fn sound(buzzer: &mut Buzzer, tone: Option<u16>) {
     }
 }
 
-/// So the probe is, for who asks at any time.
 static STATE: Mutex<OneLevel, Cell<RigState>> =
     Mutex::new(Cell::new(RigState::parked(unmeasured(FingerName::Biotac))));
-/// The host stopped what it asked for.
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// The probe as the link asks it at any time.
-pub(crate) static BODY: Body = Body {
+pub(crate) const BODY: Body = Body {
     state: || STATE.lock(Cell::get),
     stop: |all| STOPPED.store(all, Relaxed),
     lost: || 0,
@@ -163,17 +155,12 @@ pub(crate) static BODY: Body = Body {
 /// A fingertip that nobody has measured; what belongs to motors is not used.
 const fn unmeasured(finger: FingerName) -> RigCalibration {
     RigCalibration {
-        pressure: finger.parts().model.calibration,
         unloaded_a: (0.0, 0.0),
         newton_per_ampere: 1.0,
-        date: 0,
-        air_known: false,
-        turned: 0,
-        serial: [0; 16],
+        ..RigCalibration::unmeasured(&finger.parts().model)
     }
 }
 
-/// The parts in the hand.
 struct Parts {
     words: Consumer<'static, Word>,
     button: Input<'static>,
@@ -284,35 +271,9 @@ impl Hand for Parts {
     }
 
     fn tell(&mut self, event: Event) {
-        tell(event);
-    }
-}
-
-/// Tells the host, once one has asked for something: a probe without a host saves the work.
-fn tell(event: Event) {
-    if let Event::Trouble(_) = &event {
-        // its words are the host's; what the person must know is on the display
-        defmt::error!("trouble: the host is told what it is");
-    }
-    if HEARD.load(Relaxed) {
-        outbox::tell(event);
-    }
-}
-
-/// Tells the host, and who answers it meanwhile; has the go / no-go output.
-struct Told(Output<'static>);
-
-impl Events for Told {
-    fn tell(&mut self, event: Event) {
-        tell(event);
-    }
-
-    fn table(&mut self, table: TableInUse) {
-        TABLE.lock(|cell| cell.set(table));
-    }
-
-    fn go(&mut self, on: bool) {
-        self.0.set_level(on.into());
+        if HEARD.load(Relaxed) {
+            outbox::tell(event);
+        }
     }
 }
 
@@ -342,7 +303,7 @@ pub(crate) async fn hand(
     // textures of a simulated world under a simulated hand; the user trains a real probe
     let table = factory::handheld(finger::name());
     let store = flash::wait(flash::open(flash), progress).await;
-    let mut events = Shown::new(Told(Output::new(go.same, Level::Low, Speed::Low)));
+    let mut events = EventSink::new(go, true);
     let mut memory = Memory::new(store, MappedTable, table, flash::buffer());
     memory.reload(&mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
@@ -373,7 +334,7 @@ pub(crate) async fn hand(
     if let Ok(store) = probe.memory.store()
         && let Err(why) = probe::restore(store, &mut probe.rig).await
     {
-        tell(Event::Trouble(why.into()));
+        probe.events.tell(Event::Trouble(why.into()));
     }
     let mut said = 0;
     loop {
@@ -393,7 +354,6 @@ pub(crate) async fn hand(
     }
 }
 
-/// Logs what came of a job.
 fn log(outcome: Outcome<'_>) {
     match outcome {
         Outcome::Judged {

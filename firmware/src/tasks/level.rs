@@ -7,10 +7,10 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 
 use crate::chip::rescue;
 
-/// The level of the tasks that talk to the host.
 pub(crate) struct OneLevel;
 
-/// Whether this runs where an image's tasks for the host do. An image has those of one level only: `rig.rs`, `handheld.rs`.
+/// Whether this runs where an image's tasks for the host do. An image has those of one level only: `rig.rs`,
+/// `handheld.rs`.
 fn is_there() -> bool {
     match SCB::vect_active() {
         VectActive::ThreadMode => true,

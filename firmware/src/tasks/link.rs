@@ -2,12 +2,13 @@
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
+use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::usart::{self, BufferedUart, BufferedUartRx, BufferedUartTx};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::channel::Channel;
 use embedded_io_async::{Read as _, Write as _};
 use static_cell::ConstStaticCell;
-use tactus_core::probe::seams::Panel;
+use tactus_core::probe::seams::{Events, Panel};
 use tactus_core::probe::{RigState, TableInUse, Turn, receive as receive_request};
 use tactus_core::sensor::FingerCode;
 use tactus_core::wire::ArmReport;
@@ -22,18 +23,13 @@ use crate::chip::{finger, slots};
 pub(crate) const CHUNK: usize = 256;
 
 static DAMAGED_FRAMES: AtomicU32 = AtomicU32::new(0);
-/// Requests for the session.
 pub(crate) static JOBS: Channel<OneLevel, Request, 1> = Channel::new();
-/// The session works on a request.
 pub(crate) static BUSY: AtomicBool = AtomicBool::new(false);
 /// Somebody has asked for something since the probe booted.
 pub(crate) static HEARD: AtomicBool = AtomicBool::new(false);
 
-/// The table in force.
-pub(crate) static TABLE: Mutex<OneLevel, Cell<TableInUse>> =
-    Mutex::new(Cell::new(TableInUse::NONE));
+static TABLE: Mutex<OneLevel, Cell<TableInUse>> = Mutex::new(Cell::new(TableInUse::NONE));
 
-/// Opens the line.
 pub(crate) fn open(
     pins: board::Link,
 ) -> Option<(BufferedUartTx<'static>, BufferedUartRx<'static>)> {
@@ -72,7 +68,6 @@ pub(crate) async fn send(mut uart: BufferedUartTx<'static>) {
 
 /// What the probe runs on, for what is answered at any time.
 pub(crate) struct Body {
-    /// What the rig is doing.
     pub(crate) state: fn() -> RigState,
     /// Stops it; whether all that was asked for.
     pub(crate) stop: fn(bool),
@@ -83,7 +78,7 @@ pub(crate) struct Body {
 }
 
 #[embassy_executor::task]
-pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, body: &'static Body) {
+pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, mut body: Body) {
     static RECEIVER: ConstStaticCell<Receiver> = ConstStaticCell::new(Receiver::new());
     let receiver = RECEIVER.take();
     let mut bytes = [0; 64];
@@ -97,7 +92,7 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, body: &'static Bo
         for &byte in bytes.get(..length).unwrap_or_default() {
             match receiver.push::<Request>(byte) {
                 None => {}
-                Some(Ok(request)) => received(request, body),
+                Some(Ok(request)) => received(request, &mut body),
                 Some(Err(_)) => {
                     let frames = DAMAGED_FRAMES.fetch_add(1, Relaxed) + 1;
                     tell(Event::Damaged(frames));
@@ -107,26 +102,22 @@ pub(crate) async fn receive(mut uart: BufferedUartRx<'static>, body: &'static Bo
     }
 }
 
-/// A request that has just come.
-fn received(request: Request, body: &'static Body) {
+fn received(request: Request, body: &mut Body) {
     HEARD.store(true, Relaxed);
     let busy = BUSY.load(Relaxed) || !JOBS.is_empty();
-    if receive_request(&request, busy, &mut AtAnyTime(body)) == Turn::Queue {
+    if receive_request(&request, busy, body) == Turn::Queue {
         // the queue has space: no other task queues requests
         let _ = JOBS.try_send(request);
     }
 }
 
-/// What is answered while the probe works on something else.
-struct AtAnyTime(&'static Body);
-
-impl Panel for AtAnyTime {
+impl Panel for Body {
     fn finger(&self) -> FingerCode {
         finger::code()
     }
 
     fn rig(&self) -> RigState {
-        (self.0.state)()
+        (self.state)()
     }
 
     fn table(&self) -> TableInUse {
@@ -139,18 +130,18 @@ impl Panel for AtAnyTime {
             late_slots: slots::LATE.load(Relaxed),
             parity_errors: slots::PARITY.load(Relaxed),
             error_frames: slots::ERROR_FRAMES.load(Relaxed),
-            lost_samples: slots::LOST.load(Relaxed) + (self.0.lost)(),
+            lost_samples: slots::LOST.load(Relaxed) + (self.lost)(),
             lost_reports: outbox::LOST_REPORTS.load(Relaxed),
             damaged_frames: DAMAGED_FRAMES.load(Relaxed),
         }
     }
 
     fn stop(&mut self, all: bool) {
-        (self.0.stop)(all);
+        (self.stop)(all);
     }
 
     fn arm(&mut self, report: ArmReport) -> bool {
-        (self.0.arm)(report)
+        (self.arm)(report)
     }
 
     fn stream(&mut self, on: bool) {
@@ -159,5 +150,38 @@ impl Panel for AtAnyTime {
 
     fn tell(&mut self, event: Event) {
         tell(event);
+    }
+}
+
+/// The sink of a probe's events: the line, the table that is answered with, and the go / no-go output.
+pub(crate) struct EventSink {
+    go: Output<'static>,
+    /// Nothing is sent before somebody has asked for something: a probe without a host saves the work.
+    waits: bool,
+}
+
+impl EventSink {
+    pub(crate) fn new(go: board::Go, waits: bool) -> Self {
+        let go = Output::new(go.same, Level::Low, Speed::Low);
+        Self { go, waits }
+    }
+}
+
+impl Events for EventSink {
+    fn tell(&mut self, event: Event) {
+        if let Event::Trouble(_) = &event {
+            defmt::error!("trouble: the host is told what it is");
+        }
+        if !self.waits || HEARD.load(Relaxed) {
+            tell(event);
+        }
+    }
+
+    fn table(&mut self, table: TableInUse) {
+        TABLE.lock(|cell| cell.set(table));
+    }
+
+    fn go(&mut self, on: bool) {
+        self.go.set_level(on.into());
     }
 }

@@ -14,10 +14,8 @@ const OUT: usize = 6144;
 pub(crate) static OUTBOX: Pipe<OneLevel, OUT> = Pipe::new();
 static NUMBER: AtomicU16 = AtomicU16::new(0);
 pub(crate) static LOST_REPORTS: AtomicU32 = AtomicU32::new(0);
-/// Raw samples are wanted.
 pub(crate) static STREAM: AtomicBool = AtomicBool::new(false);
 
-/// Says that the probe has booted, and with which finger.
 pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
     tell(Event::Booted {
         protocol: PROTOCOL,
@@ -28,8 +26,8 @@ pub(crate) fn booted(reset: Reset, last_words: Option<Text>) {
     });
 }
 
-/// Sends an event to the host. An event that does not fit into the outbox is dropped and counted; it leaves a gap in the
-/// numbers.
+/// Sends an event to the host. An event that does not fit into the outbox is dropped and counted; it leaves a gap in
+/// the numbers.
 pub(crate) fn tell(event: Event) {
     let report = Report {
         number: NUMBER.fetch_add(1, Relaxed),

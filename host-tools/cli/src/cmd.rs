@@ -32,9 +32,13 @@ pub(crate) use output::{Done, UsageError};
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
-#[command(name = "tactus", version, about = "Tactus tells what a surface is by touching it", long_about = "Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and \
-fineness, and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & \
-Loeb 2012).\n\nThis command runs the core of the firmware, the same code, on recordings and on a simulated rig.", after_help = after_help())]
+#[command(
+    name = "tactus",
+    version,
+    about = "Tactus tells what a surface is by touching it",
+    long_about = LONG_ABOUT,
+    after_help = after_help()
+)]
 struct Tactus {
     /// Show no progress and no notices on the terminal, only results and errors
     #[arg(long, short, global = true)]
@@ -63,6 +67,12 @@ enum Command {
     Convert(convert::Args),
     Unpack(unpack::Args),
 }
+
+const LONG_ABOUT: &str = "\
+Tactus tells what a surface is by touching it: it slides a BioTac fingertip, measures traction, roughness and fineness,
+and chooses each next movement so as to tell the remaining candidates apart (Bayesian exploration, Fishel & Loeb 2012).
+
+This command runs the core of the firmware, the same code, on recordings and on a simulated rig.";
 
 /// What to try first, and what scripts need to know.
 fn after_help() -> String {

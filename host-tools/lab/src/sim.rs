@@ -8,7 +8,6 @@ pub mod fault_case;
 pub mod flash;
 pub mod handheld;
 pub mod over_link;
-pub mod press;
 pub mod probe;
 pub mod recorded;
 pub mod rig;

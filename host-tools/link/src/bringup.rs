@@ -11,7 +11,6 @@ mod line;
 mod mistakes;
 mod mounted;
 mod report;
-mod result;
 mod seams;
 mod steps;
 pub mod weights;
@@ -21,7 +20,6 @@ pub use line::Line;
 pub use mistakes::{MISTAKES, Mistake, Named};
 pub use mounted::Mounted;
 pub use report::Report;
-pub use result::{Series, StepResult};
 pub use seams::{Board, Person, Probe, Trouble};
 pub use steps::{Bench, Image, STEPS, Step};
 
@@ -63,9 +61,6 @@ pub fn next_image(journal: &Journal) -> Option<Image> {
 
 /// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that
 /// takes another image.
-///
-/// # Errors
-/// See [`Trouble`].
 pub fn run(
     mut ends: Ends<'_>,
     person: &mut dyn Operator,
@@ -81,13 +76,11 @@ pub fn run(
                 person,
             })?,
             (Run::Rig(run), Ends::Rig(probe)) => {
-                let weighed = journal
-                    .last("scale")
-                    .and_then(|entry| entry.series.as_ref());
+                let weighed = journal.last("scale");
                 let now = person.now();
                 let digits = now.chars().filter(char::is_ascii_digit).take(8);
                 run(&mut Mounted {
-                    weighed: weighed.map_or(Vec::new(), |series| series.points.clone()),
+                    weighed: weighed.map_or(Vec::new(), |entry| entry.points.clone()),
                     today: digits.collect::<String>().parse().unwrap_or(0),
                     probe: &mut **probe,
                     person,

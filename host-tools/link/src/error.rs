@@ -32,8 +32,7 @@ pub enum PortError {
 }
 
 impl PortError {
-    /// Returns true where the probe had its power just now, and is to be asked again.
-    pub fn is_restart(&self) -> bool {
+    pub(crate) fn is_restart(&self) -> bool {
         matches!(self, Self::Link(LinkError::Rebooted { .. }))
     }
 }

@@ -145,9 +145,6 @@ pub struct Follower<'t> {
 
 impl<'t> Follower<'t> {
     /// A follower of the exploration that was asked for, on the probe's table, with a rig that measures `measured`.
-    ///
-    /// # Errors
-    /// See [`ExplorerError`].
     pub fn new(
         table: Table<'t>,
         measured: PropertySet,
@@ -180,9 +177,6 @@ impl<'t> Follower<'t> {
     }
 
     /// Takes in what the probe says, report by report.
-    ///
-    /// # Errors
-    /// See [`FollowError`]: something could not be compared.
     pub fn hear(&mut self, event: &Event) -> Result<(), FollowError> {
         match event {
             Event::Chosen {
@@ -244,7 +238,6 @@ impl<'t> Follower<'t> {
         }
     }
 
-    /// The number of the slide that is due.
     fn due(&self) -> u8 {
         self.explorer.slides().saturating_add(1)
     }

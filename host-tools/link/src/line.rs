@@ -10,7 +10,6 @@ use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
 
 use super::lock::PortLock;
 
-/// The probe's line.
 const BAUD: u32 = 921_600;
 /// Reads come back after that, so that somebody looks at the keyboard; writes may take as long.
 const READ: Duration = Duration::from_millis(50);
@@ -77,11 +76,10 @@ pub struct PortInfo {
     /// Its name.
     pub name: String,
     /// The USB device's description of itself, if it is one.
-    pub usb: Option<UsbPortInfo>,
+    pub(crate) usb: Option<UsbPortInfo>,
 }
 
 impl PortInfo {
-    /// Returns true for an ST-LINK, as a NUCLEO has.
     fn is_nucleo(&self) -> bool {
         self.usb.as_ref().is_some_and(|usb| usb.vid == ST)
     }
@@ -118,7 +116,6 @@ impl fmt::Display for PortInfo {
     }
 }
 
-/// A line for each.
 fn lines(ports: &[PortInfo]) -> String {
     let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
     lines.join("\n")
@@ -150,9 +147,6 @@ pub trait Line: Read + Write + Send {}
 impl<T: Read + Write + Send> Line for T {}
 
 /// Opens the port of this name, and keeps other commands from it.
-///
-/// # Errors
-/// See [`LineError`].
 pub fn open(name: &str) -> Result<(Box<dyn Line>, PortLock), LineError> {
     // however its address was written
     let same = tcp_address(name).map(|address| format!("tcp:{address}"));
@@ -166,9 +160,6 @@ pub fn open(name: &str) -> Result<(Box<dyn Line>, PortLock), LineError> {
 }
 
 /// The only NUCLEO among these.
-///
-/// # Errors
-/// There is none, or there are several.
 pub fn only_nucleo(found: Vec<PortInfo>) -> Result<String, LineError> {
     let nucleos: Vec<&PortInfo> = found.iter().filter(|port| port.is_nucleo()).collect();
     match nucleos.as_slice() {
@@ -208,9 +199,6 @@ fn serial(port: &str) -> Result<Box<dyn Line>, LineError> {
 }
 
 /// Opens a TCP port, "HOST:PORT".
-///
-/// # Errors
-/// [`LineError::Tcp`].
 pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
     let error = |why| LineError::Tcp {
         address: address.to_owned(),

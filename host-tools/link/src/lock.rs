@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct PortLock(#[expect(dead_code, reason = "its lock ends with it")] Option<File>);
 
-/// The folder of the locks: only this user can write there.
 fn folder() -> Option<PathBuf> {
     let given = |variable| std::env::var_os(variable).map(PathBuf::from);
     given("XDG_RUNTIME_DIR")

@@ -1,7 +1,7 @@
 //! Logs of sessions, which `tactus device --log` writes: a line of JSON for every command and every report.
 //!
 //! The first line says who wrote it: `{"session":{"tactus":"0.1.0","protocol":1,"port":"/dev/ttyACM0"}}`. Each other is
-//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log itself:
+//! `{"command":...}` or `{"report":...}` with a message of [`tactus_core::wire`]. What a replay needs is in the log:
 //! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
@@ -42,9 +42,6 @@ impl<'a> Line<'a> {
     }
 
     /// Writes it, with its end.
-    ///
-    /// # Errors
-    /// A failure to write.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         serde_json::to_writer(&mut *out, self)?;
         out.write_all(b"\n")
@@ -61,9 +58,6 @@ pub struct Log {
 
 impl Log {
     /// Begins a log of what is said at a port; a file that is there already is left alone.
-    ///
-    /// # Errors
-    /// It is there, or cannot be written.
     pub fn create(path: &Path, port: &str) -> io::Result<Self> {
         let file = File::create_new(path).map_err(|why| match why.kind() {
             io::ErrorKind::AlreadyExists => {
@@ -89,9 +83,6 @@ impl Log {
     }
 
     /// Everything so far is in the file.
-    ///
-    /// # Errors
-    /// Something could not be written.
     pub fn flush(&mut self) -> io::Result<()> {
         let written = std::mem::replace(&mut self.failed, Ok(()));
         let flushed = written.and_then(|()| self.file.flush());
@@ -131,9 +122,6 @@ pub enum LogError {
 const MAX_LINE: u64 = 1 << 20;
 
 /// Reads a log line by line.
-///
-/// # Errors
-/// See [`LogError`].
 pub fn read(log: impl Read, mut each: impl FnMut(Line<'static>)) -> Result<(), LogError> {
     let (mut lines, mut line) = (BufReader::new(log), Vec::new());
     for number in 1.. {

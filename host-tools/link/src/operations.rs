@@ -95,7 +95,6 @@ pub struct Learned {
     pub table: Arc<[u8]>,
 }
 
-/// The name of a texture as the probe keeps it.
 fn name_of(name: &str) -> Result<Name> {
     say::name_of(name).map_err(OperationError::said)
 }

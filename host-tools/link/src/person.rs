@@ -41,7 +41,6 @@ pub struct Backup {
 pub struct Words(Arc<Mutex<Vec<u8>>>);
 
 impl Words {
-    /// Words since the last time.
     pub(super) fn take(&self) -> Vec<u8> {
         let mut words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         std::mem::take(&mut *words)

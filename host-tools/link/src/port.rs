@@ -64,7 +64,6 @@ impl<S: Read + Write> Port<S> {
         }
     }
 
-    /// Sends what is due; how many bytes came.
     fn exchange(&mut self, bytes: &mut [u8], reads: bool) -> Result<usize, PortError> {
         let send = self.probe.to_send();
         if !send.is_empty() {

@@ -136,7 +136,6 @@ impl State {
         Ok(())
     }
 
-    /// Takes in what came while no job is under way.
     fn listen(&mut self) -> Vec<Report> {
         let received = take(&mut self.received);
         let reports = self.session.receive(&received);

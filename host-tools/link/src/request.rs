@@ -72,9 +72,6 @@ impl Request<()> {
     }
 
     /// Has the probe take and keep these constants.
-    ///
-    /// # Errors
-    /// [`LinkError::Calibration`] for constants that cannot be.
     pub fn write_calibration(calibration: &RigCalibration) -> Result<Self, LinkError> {
         calibration.check()?;
         Ok(Self::command(Command::WriteCalibration(

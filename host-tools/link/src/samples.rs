@@ -12,9 +12,6 @@ pub fn of_all(moved: impl IntoIterator<Item = Option<bool>>) -> Option<bool> {
 }
 
 /// The table with this note of each texture, by its index, in place of what it says of that.
-///
-/// # Errors
-/// These bytes are no table.
 pub fn note(bytes: &[u8], moved: impl Fn(u16) -> Option<bool>) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let says = |texture| table.moved(texture);
@@ -66,9 +63,6 @@ pub enum Noting {
 }
 
 /// Notes how the trials of a texture were made, in the table that a probe uses.
-///
-/// # Errors
-/// These bytes are no table.
 pub fn noting(bytes: &[u8], name: &str, moved: Option<bool>) -> Result<Noting, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
     let Some(texture) = table.find(name).filter(|&t| table.moved(t) != moved) else {

@@ -60,8 +60,7 @@ impl Prompts {
     }
 }
 
-/// A probe in words: its status, its constants, and the frames and reports that were damaged or lost here.
-pub fn status_rows(
+pub(crate) fn status_rows(
     name: &str,
     status: &Status,
     calibration: &RigCalibration,
@@ -140,9 +139,6 @@ pub enum NameError {
 }
 
 /// The name of a texture as the probe keeps it.
-///
-/// # Errors
-/// See [`NameError`].
 pub fn name_of(name: &str) -> Result<Name, NameError> {
     let name = name.trim();
     if name.is_empty() {
@@ -174,17 +170,16 @@ pub fn movements(high_force: bool) -> String {
 }
 
 /// Facts that a person must know who turns high forces on.
-pub const HIGH_FORCE: &str = "\
+pub(crate) const HIGH_FORCE: &str = "\
 With high forces on, movements may press with up to 2 N, and the guard acts at 2.1 N by P_DC. Above 2 N the skin lies
 on the finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever
 presses on. What keeps the finger whole then is no program: a mount whose spring yields (preloaded to
 2.05 N, 0.009 N/mm), or a hard stop that the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before
 2 N are reached.";
 /// The question to such a person.
-pub const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
+pub(crate) const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
 
-/// Prints the probe's settings.
-pub fn show_settings(settings: &Settings, out: &mut impl Write) -> io::Result<()> {
+pub(crate) fn show_settings(settings: &Settings, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
         "The probe's limits are {}.",
@@ -213,8 +208,7 @@ pub fn forgotten(what: &Forget) -> String {
     }
 }
 
-/// The request to somebody beside the probe between two trials.
-pub fn move_sample(name: &str) -> String {
+pub(crate) fn move_sample(name: &str) -> String {
     format!("Move or turn {name} under the finger, so that the next slide is on another track")
 }
 
@@ -223,8 +217,7 @@ pub fn not_noted(why: &str) -> String {
     format!("Whether the sample was moved is not noted in the table: {why}")
 }
 
-/// The table that the probe uses after it went back to its firmware's own.
-pub fn uses_factory(now: &Status) -> String {
+pub(crate) fn uses_factory(now: &Status) -> String {
     let (textures, crc) = (count(now.textures, "texture"), now.table_crc);
     format!("The probe uses the firmware's own table: {textures}, checksum {crc:08x}")
 }
@@ -245,8 +238,7 @@ pub fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-/// The constants in words.
-pub fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)> {
+pub(crate) fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)> {
     let (offset_ma, slope_ma) = (c.unloaded_a.0 * 1e3, c.unloaded_a.1 * 1e3);
     let motor = format!("{offset_ma:.1} mA + {slope_ma:.3} mA per mm/s without load");
     let mn = c.pressure.force_mn_per_count;
@@ -297,8 +289,7 @@ pub fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Prints values, each after its name.
-pub fn show_rows(rows: &[(&str, String)], out: &mut impl Write) -> io::Result<()> {
+pub(crate) fn show_rows(rows: &[(&str, String)], out: &mut impl Write) -> io::Result<()> {
     rows.iter()
         .try_for_each(|(name, value)| writeln!(out, "{name:<15} {value}"))
 }
@@ -323,7 +314,7 @@ pub fn sensor(c: &RigCalibration) -> Option<String> {
 
 /// Prints what follows an exploration: what the probe learned, what it asks, and the frames and reports that were
 /// damaged or lost.
-pub fn show_identified(
+pub(crate) fn show_identified(
     identified: &Identified,
     (damaged, missing): (u64, u64),
     mut out: impl Write,
@@ -352,8 +343,7 @@ pub fn show_identified(
     Ok(())
 }
 
-/// Prints what a training shows of a report.
-pub fn show_training(
+pub(crate) fn show_training(
     report: &Report,
     prompts: &mut Prompts,
     out: &mut impl Write,
@@ -391,8 +381,7 @@ pub fn show_verifying(
     }
 }
 
-/// The table's note on the sample of a texture, in words.
-pub fn of_sample(moved: Option<bool>) -> &'static str {
+pub(crate) fn of_sample(moved: Option<bool>) -> &'static str {
     match moved {
         Some(true) => "Its sample was moved between trials.",
         Some(false) => {

@@ -10,7 +10,6 @@ use tactus_core::wire::{
 /// A request that may be made twice is made so often before the line is given up.
 pub const MAX_TRIES: u8 = 5;
 
-/// What to do about a probe that speaks this version.
 fn remedy(of: &u8) -> &'static str {
     if *of > PROTOCOL {
         "this program is older, install the tactus of the probe's version, or flash this one's firmware: `tactus \
@@ -98,9 +97,6 @@ pub struct Session {
 
 impl Session {
     /// Appends the bytes of a request to `send`, and says its id. A 0 goes before it: what was on the line ends there.
-    ///
-    /// # Errors
-    /// [`TooLong`].
     pub fn request(&mut self, command: Command, send: &mut Vec<u8>) -> Result<u16, TooLong> {
         let id = self.next_id;
         let mut buffer = [0; MAX_FRAME + 1];

@@ -17,9 +17,6 @@ pub struct PushTable {
 
 impl PushTable {
     /// The table at the beginning of `bytes`, checked.
-    ///
-    /// # Errors
-    /// [`LinkError::Table`], [`LinkError::Textures`].
     pub fn new(bytes: &[u8]) -> Result<Self, LinkError> {
         let table = Table::read(bytes)?;
         if usize::from(table.textures()) > MAX_TEXTURES {

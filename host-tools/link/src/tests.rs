@@ -650,9 +650,17 @@ proptest! {
     }
 
     #[test]
-    fn damaged_reports_are_never_believed_and_later_ones_understood(damage in damage(), garbage in proptest::collection::vec(any::<u8>(), 0..300)) {
+    fn damaged_reports_are_never_believed_and_later_ones_understood(
+        damage in damage(),
+        garbage in proptest::collection::vec(any::<u8>(), 0..300),
+    ) {
         let mut probe = Probe::default();
-        let frames: Vec<Vec<u8>> = (0..60).map(|n| probe.event(Event::TablePart { offset: n * 256, length: 15_360, bytes: (0..PART).map(|b| b as u8).collect() })).collect();
+        let part = |n: u32| Event::TablePart {
+            offset: n * 256,
+            length: 15_360,
+            bytes: (0..PART).map(|b| b as u8).collect(),
+        };
+        let frames: Vec<Vec<u8>> = (0..60).map(|n| probe.event(part(n))).collect();
         let sent = Session::default().receive(&frames.concat());
         let mut bytes = frames.concat();
         let length = bytes.len();

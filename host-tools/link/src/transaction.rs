@@ -12,25 +12,15 @@ pub trait Transaction {
     type Outcome;
 
     /// The next request; `None` when all is done. Asked for once the last one is done.
-    ///
-    /// # Errors
-    /// The transaction cannot continue.
     fn next(&mut self) -> Result<Option<Command>, LinkError>;
 
     /// Takes an event that the probe reports meanwhile.
-    ///
-    /// # Errors
-    /// The transaction cannot continue.
     fn hear(&mut self, event: &Event) -> Result<(), LinkError>;
 
     /// The outcome, once all requests are done.
-    ///
-    /// # Errors
-    /// [`LinkError::NoAnswer`], or the answer makes no sense.
     fn outcome(&mut self) -> Result<Self::Outcome, LinkError>;
 }
 
-/// A request that is not over.
 #[derive(Debug)]
 struct Sent {
     command: Command,
@@ -53,9 +43,6 @@ pub struct Job<E> {
 
 impl<E: Transaction> Job<E> {
     /// Begins: appends the first request to `send`.
-    ///
-    /// # Errors
-    /// See [`LinkError`].
     pub fn begin(
         transaction: E,
         session: &mut Session,
@@ -120,8 +107,7 @@ impl<E: Transaction> Job<E> {
         self.sent.as_ref().map(|sent| &sent.command)
     }
 
-    /// Number of the request that is under way, as it was sent last.
-    pub fn last_id(&self) -> Option<u16> {
+    pub(crate) fn last_id(&self) -> Option<u16> {
         self.sent.as_ref()?.ids.last().copied()
     }
 
@@ -182,7 +168,6 @@ impl<E: Transaction> Job<E> {
     }
 }
 
-/// Whether a request made twice does what it does once.
 fn may_repeat(command: &Command) -> bool {
     match command {
         Command::Status

@@ -10,15 +10,15 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 
 use crate::campaign::{FOLDER, TABLES};
-use crate::firmware::{self, IMAGES, hash, shown};
+use crate::firmware::{self, hash, shown};
 use crate::shell::{self, root, run, target};
 use crate::toolchain::{self, BROWSER};
 use crate::{page, python};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask bundle                             everything, into target/bundle
-  cargo xtask bundle --only tactus-rig,command   one image and the command for this PC";
+  cargo xtask bundle                  everything, into target/bundle
+  cargo xtask bundle --out release    into another folder";
 
 const SUMS: &str = "SHA256SUMS";
 const LICENCES: &str = "LICENSES-DEPENDENCIES.txt";
@@ -28,17 +28,12 @@ pub(crate) struct Options {
     /// The folder to write; files of an earlier release in it are replaced
     #[arg(long, value_name = "DIR", default_value = "target/bundle")]
     out: PathBuf,
-    /// Some of it: images, command, wheel, page
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = names())]
-    only: Vec<String>,
 }
 
-/// Names and contents.
 type Files = BTreeMap<String, Vec<u8>>;
 
 /// A file of a release that runs on a PC.
 struct Product {
-    /// Its name for `--only`.
     name: &'static str,
     /// Its manifest, its package, and the platform if it is not this machine's: whose licences count.
     made_of: (&'static str, &'static str, Option<&'static str>),
@@ -83,7 +78,6 @@ const FIRMWARE: (&str, &str, Option<&str>) = (
     Some(toolchain::CHIP.triple),
 );
 
-/// The program `tactus` for this PC.
 fn command() -> Result<(String, PathBuf)> {
     let folder = target().join("command");
     let mut build = toolchain::host_build(&folder);
@@ -102,15 +96,9 @@ fn command() -> Result<(String, PathBuf)> {
     Ok((format!("tactus-{}{end}", toolchain::host()?), built))
 }
 
-/// All that `--only` knows.
-fn names() -> Vec<&'static str> {
-    [&IMAGES[..], &PRODUCTS.map(|product| product.name)].concat()
-}
-
-/// Builds what was asked for and writes the release.
 pub(crate) fn bundle(options: &Options) -> Result<()> {
     let out = root().join(&options.out);
-    let files = files(&options.only)?;
+    let files = files()?;
     write(&out, &files)?;
     for (name, bytes) in &files {
         println!("{:>9}  {}", bytes.len(), shown(&out.join(name)));
@@ -118,24 +106,18 @@ pub(crate) fn bundle(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Everything that is in a release, or what of it is named.
-fn files(only: &[String]) -> Result<Files> {
-    let wanted = |name: &str| only.is_empty() || only.iter().any(|one| one == name);
-    let images: Vec<&str> = IMAGES.into_iter().filter(|name| wanted(name)).collect();
-    let (mut files, mut parts) = (Files::new(), Vec::new());
-    if !images.is_empty() {
-        for elf in firmware::compile(&images)? {
-            let (name, bytes) = (firmware::name(&elf)?, read(&elf)?);
-            let flat = image::flat(&bytes).with_context(|| name.to_owned())?;
-            files.insert(format!("{name}.bin"), flat);
-            files.insert(format!("{name}.elf"), bytes);
-        }
-        for name in TABLES.into_iter().flat_map(|(_, names)| names) {
-            files.insert((*name).to_owned(), read(&root().join(FOLDER).join(name))?);
-        }
-        parts.push(FIRMWARE);
+fn files() -> Result<Files> {
+    let (mut files, mut parts) = (Files::new(), vec![FIRMWARE]);
+    for elf in firmware::elves()? {
+        let (name, bytes) = (firmware::name(&elf)?, read(&elf)?);
+        let flat = image::flat(&bytes).with_context(|| name.to_owned())?;
+        files.insert(format!("{name}.bin"), flat);
+        files.insert(format!("{name}.elf"), bytes);
     }
-    for product in PRODUCTS.into_iter().filter(|product| wanted(product.name)) {
+    for name in TABLES.into_iter().flat_map(|(_, names)| names) {
+        files.insert((*name).to_owned(), read(&root().join(FOLDER).join(name))?);
+    }
+    for product in PRODUCTS {
         let name = product.name;
         if let Err(why) = (product.lacks)() {
             if std::env::var("CI").as_deref() == Ok("true") {
@@ -162,7 +144,6 @@ fn read(file: &Path) -> Result<Vec<u8>> {
     std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))
 }
 
-/// Hash sums in the format of sha256sum.
 fn sums(files: &Files) -> String {
     files.iter().fold(String::new(), |mut sums, (name, bytes)| {
         let _ = writeln!(sums, "{}  {name}", hash(bytes));
@@ -204,6 +185,7 @@ fn flashing() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::firmware::IMAGES;
 
     #[test]
     fn a_release_can_be_written_twice_and_leaves_other_files_alone() {

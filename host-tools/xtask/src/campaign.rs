@@ -24,7 +24,6 @@ Examples:
   cargo xtask campaign factory -- --write           makes the tables that come with the firmware, shared/tables/*.tact
   cargo xtask campaign fuzz -- table --seconds 60   one target";
 
-/// The page of the book that lists the results.
 const BOOK: &str = "docs/src/tests.md";
 
 #[derive(Args)]
@@ -49,7 +48,6 @@ pub(crate) struct Options {
     options: Vec<OsString>,
 }
 
-/// A part of the campaign.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     /// Every other part, the short ones first
@@ -83,7 +81,6 @@ impl Part {
         value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// The seeds of a part that takes them.
     fn seeds(self, options: &Options) -> Option<RangeInclusive<u64>> {
         let usual = match self {
             Self::Press => 1..=100,
@@ -95,7 +92,6 @@ impl Part {
     }
 }
 
-/// Parses `A-B`, or one seed.
 fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
     let (from, to) = text.split_once('-').unwrap_or((text, text));
     match (from.parse(), to.parse()) {
@@ -104,7 +100,6 @@ fn range(text: &str) -> Result<RangeInclusive<u64>, String> {
     }
 }
 
-/// Runs a part, or all of them.
 pub(crate) fn campaign(options: &Options) -> Result<()> {
     let parts = match options.part {
         Part::All => &Part::value_variants()[1..],
@@ -162,7 +157,6 @@ fn in_book(page: &str, part: &str, row: &str) -> Result<String> {
     Ok(lines.collect::<Vec<_>>().join("\n") + "\n")
 }
 
-/// Runs a part, and returns its result in a sentence.
 fn perform(part: Part, options: &Options) -> Result<String> {
     println!("== campaign {}", part.name());
     let seeds = part.seeds(options);
@@ -189,7 +183,6 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     }
 }
 
-/// The result of a run of the emulator.
 fn result(emulator: &mut Command) -> Result<String> {
     let mut lines = Vec::new();
     hear(emulator, |line| lines.push(line.to_owned()))?;

@@ -39,7 +39,6 @@ pub(crate) fn docs(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Checks what is generated, or writes it.
 fn parts(write: bool) -> Result<()> {
     // outputs and plots are made from the recordings that one of the tests writes
     let all = ["book::the_recordings", "book::"];

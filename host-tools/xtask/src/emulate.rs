@@ -17,9 +17,7 @@ Examples:
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options";
 
-/// The image that every run is of.
 pub(crate) const RIG: &str = "tactus-rig";
-/// The image that a hand holds.
 pub(crate) const HANDHELD: &str = "tactus-handheld";
 /// The image of a probe on somebody else's arm.
 pub(crate) const ARM: &str = "tactus-arm";
@@ -49,7 +47,6 @@ fn value(options: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Builds firmware and emulator, and returns the command of a run.
 pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
     let help = options.iter().any(|o| o == "--help" || o == "-h");
     // an ELF that is named is the one to run
@@ -105,7 +102,6 @@ pub(crate) fn workspace(command: &str) -> Command {
     cargo
 }
 
-/// Tests with the images that would be flashed.
 pub(crate) fn with_images<'t>(
     tests: &'t mut Command,
     elves: &[PathBuf],

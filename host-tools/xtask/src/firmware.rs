@@ -20,7 +20,6 @@ pub(crate) const IMAGES: [&str; 5] = [
 ];
 const PROFILE: &str = "firmware";
 
-/// Builds every image, and prints its hash and its size.
 pub(crate) fn build_all() -> Result<()> {
     elves()?.iter().try_for_each(|elf| describe(elf))
 }
@@ -58,14 +57,12 @@ pub(crate) fn compile(images: &[&str]) -> Result<Vec<PathBuf>> {
     Ok(elves)
 }
 
-/// The image of this name among those that were built.
 pub(crate) fn image<'a>(elves: &'a [PathBuf], name: &str) -> Result<&'a Path> {
     let image = elves.iter().find(|elf| elf.ends_with(name));
     let image = image.with_context(|| format!("the firmware has no {name}"))?;
     Ok(image)
 }
 
-/// An image's name, "tactus-rig".
 pub(crate) fn name(elf: &Path) -> Result<&str> {
     let name = elf.file_name().and_then(|name| name.to_str());
     name.with_context(|| format!("{} has no name", elf.display()))
@@ -80,13 +77,11 @@ pub(crate) fn shown(path: &Path) -> String {
         .to_string()
 }
 
-/// SHA-256 in hexadecimal.
 pub(crate) fn hash(bytes: &[u8]) -> String {
     let digest = Sha256::digest(bytes);
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The binaries that cargo's messages name.
 fn executables(messages: &str) -> Vec<PathBuf> {
     messages
         .lines()
@@ -95,7 +90,6 @@ fn executables(messages: &str) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Says what came out.
 pub(crate) fn describe(elf: &Path) -> Result<()> {
     let image = std::fs::read(elf).with_context(|| elf.display().to_string())?;
     let size = Size::of(&image).with_context(|| elf.display().to_string())?;
@@ -107,12 +101,10 @@ pub(crate) fn describe(elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What an image takes of the chip's memories, in bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(crate) struct Size {
     /// Code, constants and the initial values of variables.
     pub(crate) flash: u64,
-    /// Variables.
     pub(crate) ram: u64,
     pub(crate) ccm: u64,
 }

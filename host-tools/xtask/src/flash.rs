@@ -12,7 +12,7 @@ use crate::shell::{self, run};
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask flash                            the rig's firmware
-  cargo xtask flash --self-test                test board and rig instead, with a report; take the finger off before
+  cargo xtask flash --self-test                the image that measures for `tactus device bringup`
   cargo xtask flash --test                     what only the chip can answer: kernels, cycles, flash, DMA; needs no rig
   cargo xtask flash -- --probe 0483:374b:SER   if there are several probes: `probe-rs list` names them";
 
@@ -21,7 +21,7 @@ pub(crate) const CHIP: &str = "STM32F429ZITx";
 
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Flash the self-test and show its report until it is stopped with Ctrl-C
+    /// Flash the image that measures for `tactus device bringup`
     #[arg(long)]
     self_test: bool,
     /// Flash the tests of the chip alone, show their results, and fail if one of them does
@@ -45,7 +45,7 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     };
     let elf = firmware::compile(&[wanted])?.remove(0);
     run(&mut command(options, &elf))?;
-    if !options.is_watched() && !options.dry_run {
+    if !options.test && !options.dry_run {
         println!(
             "The firmware runs. Its log: probe-rs attach --chip {CHIP} {}",
             firmware::shown(&elf)
@@ -54,21 +54,11 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     Ok(())
 }
 
-impl Options {
-    /// Returns true for an image that reports.
-    fn is_watched(&self) -> bool {
-        self.self_test || self.test
-    }
-}
-
 /// `tactus device flash` does it: it stays attached for a report, and ends as the image ends; the rig is left alone.
 fn command(options: &Options, elf: &Path) -> Command {
     let mut tactus = shell::tactus();
     tactus.args(["device", "flash"]).arg(elf);
-    for (flag, wanted) in [
-        ("--attach", options.is_watched()),
-        ("--dry-run", options.dry_run),
-    ] {
+    for (flag, wanted) in [("--attach", options.test), ("--dry-run", options.dry_run)] {
         if wanted {
             tactus.arg(flag);
         }
@@ -101,7 +91,7 @@ mod tests {
         assert_eq!(line([false, false], &[]), run);
         assert_eq!(
             line([true, false], &["--probe", "0483:374b"]),
-            format!("{run} --attach -- --probe 0483:374b")
+            format!("{run} -- --probe 0483:374b")
         );
         assert_eq!(line([false, true], &[]), format!("{run} --attach"));
     }

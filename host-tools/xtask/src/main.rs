@@ -96,7 +96,8 @@ enum Cli {
     /// Make a release: images, command, Python package, page, tables, licences, hash sums, and how to flash without a
     /// checkout
     ///
-    /// An ELF has the symbols that `probe-rs attach` reads the log with; .bin is the same image for other programmers. What this machine cannot build is left out, and said; with CI=true that is an error.
+    /// An ELF has the symbols that `probe-rs attach` reads the log with; .bin is the same image for other programmers.
+    /// What this machine cannot build is left out, and said; with CI=true that is an error.
     #[command(after_help = bundle::EXAMPLES)]
     Bundle(bundle::Options),
 }

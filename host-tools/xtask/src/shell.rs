@@ -10,13 +10,11 @@ use anyhow::{Context as _, Result, bail, ensure};
 /// Names the file to which tests that are skipped add a line each.
 pub(crate) const SKIP_LOG: &str = "TACTUS_SKIP_LOG";
 
-/// The top of the repository.
 pub(crate) fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.ancestors().nth(2).unwrap_or(here).to_owned()
 }
 
-/// Where cargo puts what it builds.
 pub(crate) fn target() -> PathBuf {
     root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
@@ -28,7 +26,6 @@ pub(crate) fn cargo() -> Command {
     cargo
 }
 
-/// The command `tactus`, optimised; it is built first.
 pub(crate) fn tactus() -> Command {
     let mut tactus = cargo();
     tactus.args(["run", "--quiet", "--release", "--package", "tactus-probe"]);
@@ -36,7 +33,6 @@ pub(crate) fn tactus() -> Command {
     tactus
 }
 
-/// Returns true if cargo has this command.
 pub(crate) fn has_subcommand(name: &str) -> bool {
     cargo()
         .args([name, "--version"])
@@ -44,7 +40,6 @@ pub(crate) fn has_subcommand(name: &str) -> bool {
         .is_ok_and(|o| o.status.success())
 }
 
-/// Processors of this machine.
 pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }

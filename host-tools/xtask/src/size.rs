@@ -28,7 +28,6 @@ const MARGIN: u64 = 2;
 const STACK: u64 = 192 * KB - MAX_VARIABLES - 16 * KB;
 /// Images that move the finger, or take slides: nothing of ours panics in them.
 const MOVING: [&str; 3] = ["tactus-rig", "tactus-arm", "tactus-handheld"];
-/// The image whose stack is measured.
 const RIG: &str = "tactus-rig";
 
 #[derive(Args, Default)]
@@ -38,7 +37,6 @@ pub(crate) struct Options {
     no_stack: bool,
 }
 
-/// An image and what was measured of it.
 struct Measured {
     name: String,
     size: Size,
@@ -60,7 +58,6 @@ pub(crate) fn size(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Builds the images and measures them.
 fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     let mut images = Vec::new();
     for elf in firmware::elves()? {
@@ -82,7 +79,6 @@ fn measure(no_stack: bool) -> Result<Vec<Measured>> {
     Ok(images)
 }
 
-/// Measures the stack on the emulated board.
 fn stack(elf: &Path) -> Result<Value> {
     run(&mut emulate::build())?;
     let output = emulate::program("stack")
@@ -100,7 +96,6 @@ fn worst_stack(image: &Measured) -> Option<u64> {
     image.stack.as_ref()?.get("bound")?.as_u64()
 }
 
-/// The limits that an image misses, as far as they were measured.
 fn missed(image: &Measured) -> Vec<String> {
     let Size { flash, ram, .. } = image.size;
     let stack = worst_stack(image);
@@ -132,7 +127,6 @@ fn ours(image: &Measured) -> Vec<String> {
     image.panics.iter().filter(ours).map(said).collect()
 }
 
-/// What is wrong with the images.
 fn wrong(images: &[Measured]) -> Vec<String> {
     let missed = images.iter().flat_map(missed);
     missed.chain(images.iter().flat_map(ours)).collect()

@@ -7,10 +7,8 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::shell::{cargo, root, run, target};
 
-/// What is built for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Target {
-    /// Its name.
     pub(crate) triple: &'static str,
     /// What of the standard library is built with it, where a toolchain brings the source only.
     library: &'static str,
@@ -32,7 +30,6 @@ pub(crate) const BROWSER: Target = Target {
     folders: ["page-build", "page-debian"],
 };
 
-/// What builds for a [`Target`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Toolchain {
     /// The one cargo runs with; it brings the target's library.
@@ -44,66 +41,35 @@ pub(crate) enum Toolchain {
 /// The environment variable that asks for one of the toolchains, by its [`Toolchain::name`].
 pub(crate) const WANTED: &str = "TACTUS_TOOLCHAIN";
 
-/// What was found.
-#[derive(Clone, Copy)]
-struct Found {
-    /// Only this one counts.
-    wanted: Option<Toolchain>,
-    active_has_target: bool,
-    debian: bool,
-    /// apt-get is here and we are root.
-    may_install: bool,
-}
-
-#[derive(PartialEq, Eq, Debug)]
-enum Choice {
-    Use(Toolchain),
-    InstallDebian,
-    Neither,
-}
-
-fn choose(found: Found) -> Choice {
-    let active = found.active_has_target && found.wanted != Some(Toolchain::Debian);
-    if active {
-        Choice::Use(Toolchain::Active)
-    } else if found.wanted == Some(Toolchain::Active) {
-        Choice::Neither
-    } else if found.debian {
-        Choice::Use(Toolchain::Debian)
-    } else if found.may_install {
-        Choice::InstallDebian
-    } else {
-        Choice::Neither
-    }
-}
-
-/// A toolchain for a target, installed if need be.
+/// A toolchain for a target: the active one if it has the target, else Debian's, installed if need be.
 pub(crate) fn get(target: Target) -> Result<Toolchain> {
-    let help = help(target);
-    let found = Found {
-        wanted: wanted()?,
-        active_has_target: active_has(target),
-        debian: debian_lacks().is_none(),
-        may_install: Path::new("/usr/bin/apt-get").exists()
-            && stdout("id", &["-u"]).as_deref() == Some("0"),
-    };
-    match choose(found) {
-        Choice::Use(toolchain) => Ok(toolchain),
-        Choice::InstallDebian => {
-            install_debian(target)?;
-            match debian_lacks() {
-                None => Ok(Toolchain::Debian),
-                Some(what) => bail!("Debian's packages are installed, but {what}.\n{help}"),
-            }
-        }
-        Choice::Neither => bail!(
+    let (help, wanted) = (help(target), wanted()?);
+    if wanted != Some(Toolchain::Debian) && active_has(target) {
+        return Ok(Toolchain::Active);
+    }
+    let neither = || {
+        anyhow::anyhow!(
             "no Rust toolchain here builds for {}.\n{help}",
             target.triple
-        ),
+        )
+    };
+    if wanted == Some(Toolchain::Active) {
+        return Err(neither());
+    }
+    if debian_lacks().is_some() {
+        let may_install =
+            Path::new("/usr/bin/apt-get").exists() && stdout("id", &["-u"]).as_deref() == Some("0");
+        if !may_install {
+            return Err(neither());
+        }
+        install_debian(target)?;
+    }
+    match debian_lacks() {
+        None => Ok(Toolchain::Debian),
+        Some(what) => bail!("Debian's packages are installed, but {what}.\n{help}"),
     }
 }
 
-/// The toolchain that [`WANTED`] asks for, if it is set.
 fn wanted() -> Result<Option<Toolchain>> {
     let Some(name) = std::env::var_os(WANTED).filter(|name| !name.is_empty()) else {
         return Ok(None);
@@ -155,7 +121,6 @@ impl Toolchain {
         cargo
     }
 
-    /// Where it puts what it builds for a target.
     pub(crate) fn folder(self, to: Target) -> PathBuf {
         let [active, debian] = to.folders;
         target().join(match self {
@@ -164,7 +129,6 @@ impl Toolchain {
         })
     }
 
-    /// Name and version of the compiler.
     pub(crate) fn version(self) -> String {
         let (rustc, whose) = match self {
             Self::Active => ("rustc", ""),
@@ -175,7 +139,6 @@ impl Toolchain {
     }
 }
 
-/// The triple of this machine.
 pub(crate) fn host() -> Result<String> {
     let version = stdout("rustc", &["-vV"]).context("rustc does not run")?;
     let line = version.lines().find_map(|line| line.strip_prefix("host: "));
@@ -214,7 +177,6 @@ pub(crate) fn rustflags() -> OsString {
 
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
-/// The workspace's rust-version.
 const OLDEST: (u32, u32) = (1, 95);
 
 fn debian_cargo() -> Command {
@@ -321,42 +283,6 @@ fn stdout(program: &str, arguments: &[&str]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_active_toolchain_goes_first_and_nothing_is_installed_in_vain() {
-        let nothing = Found {
-            wanted: None,
-            active_has_target: false,
-            debian: false,
-            may_install: false,
-        };
-        assert_eq!(choose(nothing), Choice::Neither);
-        let root = Found {
-            may_install: true,
-            ..nothing
-        };
-        assert_eq!(choose(root), Choice::InstallDebian);
-        let debian = Found {
-            debian: true,
-            ..root
-        };
-        assert_eq!(choose(debian), Choice::Use(Toolchain::Debian));
-        let both = Found {
-            active_has_target: true,
-            ..debian
-        };
-        assert_eq!(choose(both), Choice::Use(Toolchain::Active));
-        let wants = |wanted, found| {
-            choose(Found {
-                wanted: Some(wanted),
-                ..found
-            })
-        };
-        let debians = Choice::Use(Toolchain::Debian);
-        assert_eq!(wants(Toolchain::Debian, both), debians);
-        assert_eq!(wants(Toolchain::Debian, root), Choice::InstallDebian);
-        assert_eq!(wants(Toolchain::Active, debian), Choice::Neither);
-    }
 
     #[test]
     fn versions_are_compared_as_numbers() {

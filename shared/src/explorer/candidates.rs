@@ -10,9 +10,6 @@ use crate::up_to;
 
 impl<'t, const N: usize> Explorer<'t, N> {
     /// An explorer for all textures of the table, for a rig that measures `measured`.
-    ///
-    /// # Errors
-    /// See [`ExplorerError`].
     pub fn new(
         table: Table<'t>,
         measured: PropertySet,
@@ -23,9 +20,6 @@ impl<'t, const N: usize> Explorer<'t, N> {
 
     /// An explorer that only considers `candidates` (Methods, "Texture Discrimination": a pair, all others at
     /// probability 0).
-    ///
-    /// # Errors
-    /// See [`ExplorerError`].
     pub fn among(
         table: Table<'t>,
         measured: PropertySet,
@@ -37,10 +31,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         Ok(explorer)
     }
 
-    /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold twice.
-    ///
-    /// # Errors
-    /// See [`ExplorerError`]; it is of no use then.
+    /// Makes an empty one what [`Explorer::among`] gives, where it lies: it is too large for a chip's stack to hold
+    /// twice.
     pub(crate) fn consider(
         &mut self,
         measured: PropertySet,
@@ -49,24 +41,24 @@ impl<'t, const N: usize> Explorer<'t, N> {
     ) -> Result<(), ExplorerError> {
         self.config = config;
         let table = self.table;
-        let textures = table.textures();
-        let log = &mut self.log;
-        log.resize(textures.into(), OUT)
+        self.log
+            .resize(table.textures().into(), OUT)
             .map_err(|_| ExplorerError::NoSpace {
-                textures,
+                textures: table.textures(),
                 capacity: N,
             })?;
         for texture in candidates {
-            *log.get_mut(usize::from(texture))
+            *self
+                .log
+                .get_mut(usize::from(texture))
                 .ok_or(ExplorerError::Candidates)? = 0;
         }
-        self.candidates = log.iter().filter(|&&l| l == 0).count() as u16;
+        self.candidates = self.log.iter().filter(|&&l| l == 0).count() as u16;
         if self.candidates == 0 {
             return Err(ExplorerError::Candidates);
         }
-        let method = config.method;
-        if !method.suits(table.contents()) {
-            return Err(ExplorerError::Method(method));
+        if !config.method.suits(table.contents()) {
+            return Err(ExplorerError::Method(config.method));
         }
         if let Contents::Fused(set, _) = table.contents()
             && !set.measured_by(measured)
@@ -76,7 +68,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         let measured = measured.and(table.measured());
         self.measured = measured;
         let learned_by = |movement, most: fn(u8) -> bool| {
-            let mut candidates = log.iter().zip(0..).filter(|(l, _)| **l == 0);
+            let mut candidates = self.log.iter().zip(0..).filter(|(l, _)| **l == 0);
             candidates.all(|(_, texture)| most(table.trials(texture, movement)))
         };
         let movements = 0..table.movements().len() as u8;
@@ -84,7 +76,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
             movement,
             property: None,
         };
-        self.actions = match method {
+        self.actions = match config.method {
             Method::Paper | Method::Student => table
                 .actions()
                 .filter(|a| a.property.is_some_and(|p| measured.contains(p)))
@@ -103,24 +95,30 @@ impl<'t, const N: usize> Explorer<'t, N> {
         if self.actions.is_empty() {
             return Err(ExplorerError::NothingToMeasure);
         }
-        if let Method::Student | Method::StudentAll = method {
+        self.learn_of_all();
+        self.posterior = up_to(self.log.iter().map(|_| 0.0));
+        self.restart();
+        let actions = self.actions.iter();
+        self.at_first = actions
+            .map(|a| self.uncertainty(config.method, *a))
+            .collect();
+        Ok(())
+    }
+
+    fn learn_of_all(&mut self) {
+        let table = self.table;
+        if let Method::Student | Method::StudentAll = self.config.method {
             for movement in 0..table.movements().len() as u8 {
                 let of =
                     Property::ALL.map(|property| ShrinkagePrior::new(&table, movement, property));
                 self.shrinkage.extend(of);
             }
         }
-        if method == Method::Fused {
-            let novelty_models = self.actions.iter();
-            let novelty_models = novelty_models.map(|a| NoveltyModel::new(&table, a.movement));
-            self.novelty_models.extend(novelty_models);
+        if self.config.method == Method::Fused {
+            let actions = self.actions.iter();
+            self.novelty_models
+                .extend(actions.map(|a| NoveltyModel::new(&table, a.movement)));
             self.limits = table.limits();
         }
-        // as many
-        self.posterior = up_to(log.iter().map(|_| 0.0));
-        self.restart();
-        let actions = self.actions.iter();
-        self.at_first = actions.map(|a| self.uncertainty(method, *a)).collect();
-        Ok(())
     }
 }

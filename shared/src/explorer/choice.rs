@@ -146,7 +146,6 @@ impl<const N: usize> Explorer<'_, N> {
         uncertainty_of(&mut live, self.measured.iter().count())
     }
 
-    /// The one property that `action` looks at; `None` where these are several.
     pub(super) fn only_property(&self, action: Action) -> Option<Property> {
         let mut measured = self.measured.iter();
         let (first, second) = (measured.next(), measured.next());

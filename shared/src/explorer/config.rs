@@ -6,8 +6,8 @@ use crate::features::{FeatureSet, Property};
 use crate::table::{Action, Contents};
 use serde::{Deserialize, Serialize};
 
-/// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice its
-/// probability, all of 117 by about 2e-4. They are not reported either.
+/// Textures less probable than this are left out of the expected uncertainty: each changes it by at most about twice
+/// its probability, all of 117 by about 2e-4. They are not reported either.
 pub const NEGLIGIBLE: f32 = 1e-6;
 
 /// How slides are compared with the table.
@@ -84,7 +84,8 @@ pub struct Config {
     /// Share of the known textures that may be taken for new ones, if the answer may be that: with a table that is
     /// calibrated, whose own share it is unless given.
     pub false_alarm: Option<f32>,
-    /// Whether the question is whether it is the only candidate: slides are made until [`Explorer::verification`] answers.
+    /// Whether the question is whether it is the only candidate: slides are made until [`Explorer::verification`]
+    /// answers.
     ///
     /// [`Explorer::verification`]: super::Explorer::verification
     pub verify: bool,

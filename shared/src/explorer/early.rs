@@ -1,7 +1,8 @@
-//! Whether a slide may end before its end: the posterior after what it has said so far, by a table that knows slides of that length.
+//! Whether a slide may end before its end: the posterior after what it has said so far, by a table that knows slides of
+//! that length.
 //!
-//! A probability that is read again and again while a slide goes on is above a threshold more often by chance than one that is
-//! read once. So it is read at a few lengths only, and has to be more certain than at the end of a slide.
+//! A probability that is read again and again while a slide goes on is above a threshold more often by chance than one
+//! that is read once. So it is read at a few lengths only, and has to be more certain than at the end of a slide.
 
 use super::config::{Method, ObserveError};
 use super::novelty::NoveltyModel;
@@ -21,16 +22,16 @@ pub struct Look {
 }
 
 impl Look {
-    /// Whether the slide may end: see [`most_doubt`].
-    pub fn is_enough(&self, most_doubt: f32) -> bool {
+    pub(crate) fn is_enough(&self, most_doubt: f32) -> bool {
         self.known && self.doubt <= most_doubt
     }
 }
 
-/// Most doubt with which a slide ends early, unless somebody says otherwise; `None` for a method that makes all slides to their end.
+/// Most doubt with which a slide ends early, unless somebody says otherwise; `None` for a method that makes all slides
+/// to their end.
 ///
-/// Gaussians that were learned from five slides are surer than they may be, the more so when the finger has drifted: however small
-/// the doubt, the paper's method is wrong more often when it is asked more often.
+/// Gaussians that were learned from five slides are surer than they may be, the more so when the finger has drifted:
+/// however small the doubt, the paper's method is wrong more often when it is asked more often.
 pub const fn most_doubt(method: Method) -> Option<f32> {
     match method {
         Method::Fused => Some(1e-5),
@@ -39,12 +40,9 @@ pub const fn most_doubt(method: Method) -> Option<f32> {
 }
 
 impl<const N: usize> Explorer<'_, N> {
-    /// What the exploration would say if the slide of an action ended now, at the `n`th length of the table, from 1. The
-    /// exploration stands as it was. `None`: the table does not know how slides of that length are for every candidate, or the
-    /// method cannot tell.
-    ///
-    /// # Errors
-    /// See [`ObserveError`].
+    /// What the exploration would say if the slide of an action ended now, at the `n`th length of the table, from 1.
+    /// The exploration stands as it was. `None`: the table does not know how slides of that length are for every
+    /// candidate, or the method cannot tell.
     pub fn look(
         &mut self,
         action: Action,
@@ -67,10 +65,8 @@ impl<const N: usize> Explorer<'_, N> {
         look.map(Some)
     }
 
-    /// Takes in a slide of an action that ended at the `n`th length. Whether it did: otherwise the table does not know that length.
-    ///
-    /// # Errors
-    /// See [`ObserveError`]; nothing has changed then.
+    /// Takes in a slide of an action that ended at the `n`th length. Whether it did: otherwise the table does not know
+    /// that length.
     pub fn observe_early(
         &mut self,
         action: Action,
@@ -105,7 +101,6 @@ impl<const N: usize> Explorer<'_, N> {
         }
     }
 
-    /// The place of an action, and what stands for it in the table at this length.
     fn part(&mut self, action: Action, n: u8) -> Option<(usize, Action)> {
         let least = match (self.config.method, action.property) {
             (Method::Fused, None) => 1,

@@ -6,7 +6,6 @@ use crate::features::{MAX_FEATURES, Vector};
 use crate::table::MAX_MOVEMENTS;
 use crate::up_to;
 
-/// The slides of one movement in an episode.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MovementSums {
     pub(super) movement: u8,
@@ -16,11 +15,9 @@ pub(super) struct MovementSums {
     /// Sum of ln(speed) of the slides of which it is known, 1/1024, and how many these are.
     pub(super) pace: i32,
     pub(super) paces: u8,
-    /// Sum of the properties.
     pub(super) properties: [f32; 3],
 }
 
-/// All movements of an episode.
 pub(super) type Episode = Vec<MovementSums, MAX_MOVEMENTS>;
 
 /// The slides of `movement`, one more than before; `None` beyond 255, where nothing new is learned.
@@ -82,7 +79,7 @@ pub struct EpisodeSummary {
     pub certain: bool,
     /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
     pub observed: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,
-    /// At each of these the mean of ln(speed) in parts of the movement's, 1/1024; where it is not known that of a usual one. 0 with
-    /// a table that knows no speeds.
+    /// At each of these the mean of ln(speed) in parts of the movement's, 1/1024; where it is not known that of a usual
+    /// one. 0 with a table that knows no speeds.
     pub paces: Vec<i16, MAX_MOVEMENTS>,
 }

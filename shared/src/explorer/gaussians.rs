@@ -10,7 +10,6 @@ use crate::table::{Action, Gaussian, Table};
 /// A texture that is still likely, while an expected uncertainty is computed from the Gaussians of one property.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LiveGaussian {
-    /// Its probability times `root`.
     pub(super) weight: f32,
     /// Sum over all others of confusion times probability, the numerator of eq. 8, by `root`.
     pub(super) confused: f32,
@@ -23,7 +22,6 @@ pub(super) struct LiveGaussian {
 }
 
 impl LiveGaussian {
-    /// One that is not compared yet.
     fn new(probability: f32, of: Gaussian) -> Self {
         /// 100 ln 2 / 31^2: (m_i - m_j)^2 / 4 octaves are 5^2 parts of 31^2 steps.
         const UNIT: f32 = 0.072_127_7;
@@ -50,7 +48,6 @@ pub(super) fn left(weight: f32, root: f32, confused: f32) -> f32 {
 /// A texture that is still likely, while an expected uncertainty is computed from Gaussians of several properties.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LiveTexture {
-    /// Its probability.
     pub(super) probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     pub(super) confused: f32,
@@ -59,7 +56,6 @@ pub(super) struct LiveTexture {
 }
 
 impl LiveTexture {
-    /// One that is not compared yet, of which nothing is expected.
     pub(super) const fn new(probability: f32) -> Self {
         Self {
             probability,
@@ -86,10 +82,8 @@ pub(super) fn confused(a: Gaussian, b: Gaussian) -> f32 {
     libm::sqrtf(2.0 * a.sd * b.sd * narrowness) * exp_neg(exponent)
 }
 
-/// Of a property of which nothing was learned.
 const UNKNOWN: Gaussian = Gaussian { mean: 0.0, sd: 1.0 };
 
-/// The textures that are still likely, with what is expected of the property that is looked at.
 #[inline(never)]
 pub(super) fn gather_one(
     table: &Table<'_>,
@@ -108,14 +102,12 @@ pub(super) fn gather_one(
     }
 }
 
-/// One more of the textures that are still likely.
 #[inline(never)]
 pub(super) fn push(live: &mut VecView<LiveGaussian>, probability: f32, expected: Option<Gaussian>) {
     // `live` has space: it is as long as the posterior
     let _ = live.push(LiveGaussian::new(probability, expected.unwrap_or(UNKNOWN)));
 }
 
-/// Expected uncertainty (eq. 11) of these textures.
 #[inline(never)]
 pub(super) fn uncertainty_of_one(live: &mut [LiveGaussian]) -> f32 {
     let mut rest = &mut *live;

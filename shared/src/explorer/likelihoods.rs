@@ -2,7 +2,6 @@
 
 use super::config::{Method, ObserveError};
 use super::episode::one_more;
-use super::paced;
 use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
@@ -21,9 +20,6 @@ const MOST_OFF: i32 = (1 << 26) - 1;
 impl<const N: usize> Explorer<'_, N> {
     /// Takes in a slide: what `action` looks at is compared with what every candidate would feel like (eq. 3, 4). The
     /// rest of the slide is not used.
-    ///
-    /// # Errors
-    /// See [`ObserveError`]; nothing has changed then.
     pub fn observe(&mut self, action: Action, slide: &Observation) -> Result<(), ObserveError> {
         let made = self
             .actions
@@ -36,7 +32,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// Compares a slide with every candidate.
     pub(super) fn compare(
         &mut self,
         action: Action,
@@ -49,7 +44,6 @@ impl<const N: usize> Explorer<'_, N> {
         }
     }
 
-    /// Counts one slide more, of the action at this place.
     pub(super) fn count(&mut self, made: usize, action: Action) {
         if let Some(made) = self.made.get_mut(made) {
             *made = made.saturating_add(1);
@@ -69,7 +63,6 @@ impl<const N: usize> Explorer<'_, N> {
             .ok_or(ObserveError::Missing(property))
     }
 
-    /// One property: its likelihood is added to what was there.
     fn observe_property(
         &mut self,
         action: Action,
@@ -90,7 +83,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// Adds the likelihood of the mean `x` of so many slides to every logarithm.
     fn add_students(&mut self, x: f32, movement: u8, property: Property, slides: u8) {
         let mut student: Option<Student> = None;
         for texture in 0..self.table.textures() {
@@ -148,7 +140,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// All features, whitened.
     fn observe_features(
         &mut self,
         action: Action,
@@ -175,25 +166,14 @@ impl<const N: usize> Explorer<'_, N> {
         }
         self.reset_to_prior();
         // the posterior is overwritten below
-        let elsewhere = if self.table.is_paced() {
-            paced::add_likelihoods(
-                &self.table,
-                &self.episode,
-                &self.novelty_models,
-                true,
-                &mut self.log,
-                &mut self.posterior,
-            )
-        } else {
-            whitened::add_likelihoods(
-                &self.table,
-                &self.episode,
-                &self.novelty_models,
-                true,
-                &mut self.log,
-                &mut self.posterior,
-            )
-        };
+        let elsewhere = whitened::add_likelihoods(
+            &self.table,
+            &self.episode,
+            &self.novelty_models,
+            true,
+            &mut self.log,
+            &mut self.posterior,
+        );
         let (top, sum) = self.normalize();
         self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match &self.limits {
             Some(limits) => {
@@ -206,7 +186,6 @@ impl<const N: usize> Explorer<'_, N> {
         Ok(())
     }
 
-    /// What a property of a texture is expected to be in one slide.
     pub(super) fn expected(
         &self,
         texture: u16,

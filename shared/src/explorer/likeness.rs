@@ -13,14 +13,12 @@ type White = [i16; MAX_FEATURES];
 /// A texture that is still likely, while a movement is weighed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
-    /// Its whitened mean.
     mean: White,
     /// 1 where the sum of the squares of the mean is odd, else 0.
     odd: u64,
     probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     pub(super) confused: f32,
-    /// Slides that it was learned from.
     slides: u8,
 }
 
@@ -51,7 +49,6 @@ impl Candidate {
         }
     }
 
-    /// Numerator of eq. 11.
     fn left(&self) -> f32 {
         self.probability * self.confused / (self.probability + self.confused)
     }
@@ -126,7 +123,6 @@ pub(super) fn uncertainty<const N: usize>(
     live.iter().map(Candidate::left).sum()
 }
 
-/// Confuses every two of these textures.
 #[inline(never)]
 fn confuse_all(live: &mut [Candidate]) {
     let mut rest = live;
@@ -150,7 +146,6 @@ pub(super) fn confuse(a: &mut Candidate, others: &mut [Candidate]) {
     }
 }
 
-/// The textures that are still likely.
 #[inline(never)]
 pub(super) fn gather(
     table: &Table<'_>,

@@ -4,7 +4,6 @@ use super::spread::DEGREES_OF_FREEDOM;
 use crate::features::{MAX_FEATURES, Vector};
 use crate::table::{Contents, Table, oas, white};
 
-/// Fewest textures whose means say what textures are like.
 const POPULATION: usize = 3;
 /// Variance of textures' means where there are too few to say, standard deviations within a texture squared.
 const WIDE: f32 = 400.0;
@@ -14,14 +13,13 @@ const WIDE: f32 = 400.0;
 pub(super) enum Source {
     /// There are too few of them to tell.
     Nowhere,
-    /// Their means.
     Means,
     /// The table says it: mean and variances of a [`NoveltyModel`] are not used.
     Table,
 }
 
-/// A squared distance from all textures that is so many of its standard deviations above its mean counts as no greater: what
-/// is unlike everything must not become known by being unlike other new textures, too.
+/// A squared distance from all textures that is so many of its standard deviations above its mean counts as no greater:
+/// what is unlike everything must not become known by being unlike other new textures, too.
 const FARTHEST: f32 = 8.0;
 
 /// The likelihood of a texture that the table does not have: means of textures scatter as those of the table do.
@@ -31,14 +29,11 @@ pub(super) struct NoveltyModel {
     mean: [f32; MAX_FEATURES],
     variance: [f32; MAX_FEATURES],
     pub(super) source: Source,
-    /// A squared distance from all textures that is greater counts as this one.
     farthest: f32,
-    /// See [`student_norm`].
     norm: f32,
 }
 
 impl NoveltyModel {
-    /// Whether the table says it, and has limits.
     pub(super) fn is_calibrated(&self) -> bool {
         self.source == Source::Table
     }
@@ -120,8 +115,8 @@ impl NoveltyModel {
         -0.5 * norm - tail * libm::log1pf(distance / freedom)
     }
 
-    /// ln of the likelihood of a texture that the table does not have, whose `k` slides have this mean: means of textures
-    /// are a Gaussian's, as a calibrated table says. 0 in another one.
+    /// ln of the likelihood of a texture that the table does not have, whose `k` slides have this mean: means of
+    /// textures are a Gaussian's, as a calibrated table says. 0 in another one.
     pub(super) fn population_likelihood(&self, table: &Table<'_>, mean: &Vector, k: u8) -> f32 {
         let Some(population) = table.population(self.movement) else {
             return 0.0;
@@ -169,8 +164,8 @@ pub(super) fn student_norm(dimensions: usize) -> f32 {
     ln_gamma - 1.791_759_5 - half * 1.386_294_4
 }
 
-/// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve ([`oas`]):
-/// textures differ in more directions than a few of them show.
+/// Draws the variances along the axes of a covariance of `n` towards their mean, by as much as so few deserve
+/// ([`oas`]): textures differ in more directions than a few of them show.
 fn shrink(variances: &mut [f32], n: f32) {
     let d = variances.len() as f32;
     let sum: f32 = variances.iter().sum();

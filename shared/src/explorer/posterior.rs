@@ -8,7 +8,6 @@ use heapless::Vec;
 use super::config::{Config, Method};
 use super::episode::{Episode, MovementSums};
 use super::novelty::NoveltyModel;
-use super::paced;
 use super::student::ShrinkagePrior;
 use super::whitened;
 use crate::dsp::fixed::exp_neg_q30;
@@ -32,6 +31,9 @@ const CERTAIN: f32 = -2.0;
 /// Fewest slides after which a texture may be called unknown.
 const UNKNOWN_SLIDES: u8 = 2;
 
+/// Textures that [`Explorer::leading`] names.
+pub const LEADING: usize = 3;
+
 /// An answer.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Verdict {
@@ -50,9 +52,9 @@ pub struct Verdict {
     pub log_odds: Option<f32>,
 }
 
-/// What a verdict tells the user. Every count of right and wrong answers goes by this.
+/// The kind of a verdict, as the user hears it. Every count of right and wrong answers goes by this.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Told {
+pub enum VerdictKind {
     /// "It is this texture": a name told as sure.
     Sure,
     /// "It is this texture, but not as I learned it."
@@ -64,13 +66,13 @@ pub enum Told {
 }
 
 impl Verdict {
-    /// What the user is told.
-    pub fn told(&self) -> Told {
+    /// Its kind.
+    pub fn kind(&self) -> VerdictKind {
         match self {
-            Self { unknown: true, .. } => Told::New,
-            Self { changed: true, .. } => Told::Changed,
-            Self { sure: true, .. } => Told::Sure,
-            _ => Told::Undecided,
+            Self { unknown: true, .. } => VerdictKind::New,
+            Self { changed: true, .. } => VerdictKind::Changed,
+            Self { sure: true, .. } => VerdictKind::Sure,
+            _ => VerdictKind::Undecided,
         }
     }
 }
@@ -86,14 +88,12 @@ pub struct Explorer<'t, const N: usize> {
     pub(super) posterior: Vec<f32, N>,
     pub(super) candidates: u16,
     pub(super) actions: Vec<Action, MAX_ACTIONS>,
-    /// How often each action was made.
     pub(super) made: Vec<u8, MAX_ACTIONS>,
     /// Expected uncertainty of each action when nothing is known: a constant of table and candidates.
     pub(super) at_first: Vec<f32, MAX_ACTIONS>,
     pub(super) slides: u8,
     /// Slides of each movement that came to nothing, since one of it counted.
     pub(super) failed: Vec<u8, MAX_MOVEMENTS>,
-    /// The slides of this exploration, for the methods that take their mean.
     pub(super) episode: Episode,
     pub(super) log_odds: Option<f32>,
     /// For Student's t: movement by movement, properties in their order.
@@ -163,6 +163,23 @@ impl<'t, const N: usize> Explorer<'t, N> {
     /// Posterior probability of every texture of the table (eq. 3).
     pub fn posterior(&self) -> &[f32] {
         &self.posterior
+    }
+
+    /// The most probable textures and their probabilities, the first one leading.
+    pub fn leading(&self) -> Vec<(u16, f32), LEADING> {
+        let mut leading: Vec<(u16, f32), LEADING> = Vec::new();
+        for (&probability, texture) in self.posterior.iter().zip(0..) {
+            let place = leading
+                .iter()
+                .position(|(_, other)| probability > *other)
+                .unwrap_or(leading.len());
+            if place < LEADING {
+                leading.truncate(leading.len().min(LEADING - 1));
+                // one place is free now, and `place` is at most the end
+                let _ = leading.insert(place, (texture, probability));
+            }
+        }
+        leading
     }
 
     /// The answer, once there is one: the threshold is exceeded, the texture is unknown, or the last slide was made.
@@ -255,11 +272,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         let mut odds: Vec<f32, N> = up_to(log.iter().map(|_| 0.0));
         let (table, models) = (&self.table, &self.novelty_models);
         let drifting = against == Against::Drifted;
-        let (elsewhere, _) = if table.is_paced() {
-            paced::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
-        } else {
-            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?
-        };
+        let (elsewhere, _) =
+            whitened::add_likelihoods(table, episode, models, drifting, &mut log, &mut odds)?;
         let top = log.iter().copied().max().unwrap_or(0);
         Some(elsewhere - top as f32 / 65536.0)
     }
@@ -289,7 +303,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
     /// At each of [`Explorer::observed`] the mean of ln(speed): see [`super::EpisodeSummary::paces`].
     pub fn paces(&self) -> impl Iterator<Item = i16> + '_ {
         let slopes = |movement| self.table.slopes_at(movement);
-        let pace = move |v: &MovementSums| slopes(v.movement).map_or(0, |s| v.pace(&s).0);
+        let pace = move |v: &MovementSums| slopes(v.movement).map_or(0, |s| v.pace(s).mean);
         self.whole_slides().map(pace)
     }
 
@@ -325,7 +339,6 @@ impl<'t, const N: usize> Explorer<'t, N> {
         best
     }
 
-    /// Logarithms as before the first slide.
     pub(super) fn reset_to_prior(&mut self) {
         for log in &mut self.log {
             *log = if *log < LEAST { OUT } else { 0 };

@@ -10,13 +10,11 @@ pub(super) const DEGREES_OF_FREEDOM: u8 = 8;
 /// axis that of the drift.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spread {
-    /// n.
     pub(super) slides: u8,
     /// 1/(8 v) along each two axes in Q16: 20 bits at most.
     pub(super) narrowness: [u32; PAIRS],
     /// -1/2 of the sum of ln v, Q16.
     pub(super) norm: i32,
-    /// 8 + d.
     pub(super) weight: i32,
 }
 

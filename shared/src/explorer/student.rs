@@ -12,9 +12,7 @@ const HALVINGS: usize = 40;
 /// What the variances of all textures have in common at one movement, for one property.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ShrinkagePrior {
-    /// Degrees of freedom that the others are worth, d0.
     pub(super) freedom: f32,
-    /// The variance that they say, s0^2.
     variance: f32,
 }
 
@@ -58,7 +56,6 @@ impl ShrinkagePrior {
         }
     }
 
-    /// Variance of one texture, drawn towards the others'.
     pub(super) fn variance(&self, sd: f32, trials: u8) -> f32 {
         let own = f32::from(trials) - 1.0;
         (self.freedom * self.variance + own * sd * sd) / (self.freedom + own)
@@ -74,7 +71,6 @@ impl ShrinkagePrior {
     }
 }
 
-/// The density of Student's t at `x`, whose logarithm this is up to a constant.
 #[derive(Clone, Copy)]
 pub(super) struct Student {
     freedom: f32,
@@ -100,8 +96,8 @@ impl Student {
     }
 }
 
-/// ln Gamma(x + 1/2) - ln Gamma(x): the recurrence up to 6, then the asymptotic series. The difference of the two would lose
-/// digits, and the chip 1.5 KB.
+/// ln Gamma(x + 1/2) - ln Gamma(x): the recurrence up to 6, then the asymptotic series. The difference of the two would
+/// lose digits, and the chip 1.5 KB.
 fn ln_gamma_step(mut x: f32) -> f32 {
     let mut ratio = 1.0;
     while x < 6.0 {
@@ -128,7 +124,6 @@ fn digamma(mut x: f32) -> f32 {
         - square * (1.0 / 12.0 - square * (1.0 / 120.0 - square / 252.0))
 }
 
-/// Derivative of [`digamma`].
 #[inline]
 fn trigamma(mut x: f32) -> f32 {
     let mut below = 0.0;

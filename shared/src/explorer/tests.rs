@@ -1,6 +1,5 @@
 //! The explorer against the paper's equations, written out in f64.
 
-mod confusions;
 mod drift;
 mod early;
 mod fused;
@@ -242,7 +241,8 @@ proptest! {
         prop_assert!(done <= 10);
         let best = (0..candidates.len()).max_by(|&i, &j| paper.p[i].total_cmp(&paper.p[j])).unwrap();
         let verdict = explorer.verdict().unwrap();
-        prop_assert!(verdict.texture == candidates[best] || (paper.p[best] - f64::from(verdict.probability)).abs() < 1e-4);
+        let off = (paper.p[best] - f64::from(verdict.probability)).abs();
+        prop_assert!(verdict.texture == candidates[best] || off < 1e-4);
         prop_assert_eq!(verdict.sure, verdict.probability > 0.99);
     }
 
@@ -265,7 +265,10 @@ proptest! {
     }
 
     #[test]
-    fn the_order_of_the_slides_does_not_matter(cells in any_cells(), slides in proptest::collection::vec((any::<prop::sample::Index>(), -1.5f32..1.5), 2..7)) {
+    fn the_order_of_the_slides_does_not_matter(
+        cells in any_cells(),
+        slides in proptest::collection::vec((any::<prop::sample::Index>(), -1.5f32..1.5), 2..7)
+    ) {
         let bytes = table_of_cells(&cells);
         let (mut there, mut back) = (explorer(&bytes, Strategy::Bayesian), explorer(&bytes, Strategy::Bayesian));
         let actions: Vec<Action> = there.table().actions().collect();
@@ -283,7 +286,10 @@ proptest! {
     }
 
     #[test]
-    fn after_a_restart_it_is_as_new(cells in any_cells(), slides in proptest::collection::vec((any::<prop::sample::Index>(), -9f32..9.0), 1..12)) {
+    fn after_a_restart_it_is_as_new(
+        cells in any_cells(),
+        slides in proptest::collection::vec((any::<prop::sample::Index>(), -9f32..9.0), 1..12)
+    ) {
         let bytes = table_of_cells(&cells);
         let mut used = Eight::among(Table::read(&bytes).unwrap(), PropertySet::ALL, Config::default(), [1, 0]).unwrap();
         let mut new = used.clone();
@@ -302,12 +308,16 @@ proptest! {
     }
 
     #[test]
-    fn a_pair_is_explored_as_if_the_table_had_no_other(cells in any_cells(), x in proptest::collection::vec(-1f32..1.0, 4)) {
+    fn a_pair_is_explored_as_if_the_table_had_no_other(
+        cells in any_cells(),
+        x in proptest::collection::vec(-1f32..1.0, 4)
+    ) {
         let last = cells.len() - 1;
         let alone = table_of_cells(&[cells[0].clone(), cells[last].clone()]);
         let bytes = table_of_cells(&cells);
         let mut alone = explorer(&alone, Strategy::Bayesian);
-        let mut pair = Eight::among(Table::read(&bytes).unwrap(), PropertySet::ALL, Config::default(), [last as u16, 0, 0]).unwrap();
+        let (table, config) = (Table::read(&bytes).unwrap(), Config::default());
+        let mut pair = Eight::among(table, PropertySet::ALL, config, [last as u16, 0, 0]).unwrap();
         for x in x {
             let outcomes = alone.expected_outcomes();
             prop_assert_eq!(&pair.expected_outcomes(), &outcomes);

@@ -1,8 +1,8 @@
 //! "The same as this one?": whether slides are of one texture, whatever else they may be of.
 //!
-//! The score is the one by which a texture is new, with that texture as the only candidate: how much likelier the slides are of
-//! a texture that the table does not have. So it takes what is left of the other textures of the table: how much slides of one
-//! texture differ, how fingers drift, and how textures differ.
+//! The score is the one by which a texture is new, with that texture as the only candidate: how much likelier the
+//! slides are of a texture that the table does not have. So it takes what is left of the other textures of the table:
+//! how much slides of one texture differ, how fingers drift, and how textures differ.
 
 use super::answer::{Answer, Verification};
 use super::posterior::{Explorer, Verdict};
@@ -13,8 +13,8 @@ use crate::table::Against;
 pub const ENOUGH_TRIALS: u8 = 3;
 
 impl<const N: usize> Explorer<'_, N> {
-    /// As [`Explorer::verdict`]; where the question is whether it is the only candidate, once that is answered, or the last
-    /// slide was made.
+    /// As [`Explorer::verdict`]; where the question is whether it is the only candidate, once that is answered, or the
+    /// last slide was made.
     pub fn end(&self) -> Option<Verdict> {
         if !self.config.verify {
             return self.verdict();
@@ -24,8 +24,8 @@ impl<const N: usize> Explorer<'_, N> {
         (over || self.slides >= self.config.max_slides).then(|| self.best())
     }
 
-    /// What the slides made so far say of the only candidate. `None` before the first slide, where there are other candidates,
-    /// and with a table that has no limits.
+    /// What the slides made so far say of the only candidate. `None` before the first slide, where there are other
+    /// candidates, and with a table that has no limits.
     pub fn verification(&self) -> Option<Verification> {
         if self.slides == 0 {
             return None;

@@ -33,7 +33,7 @@ pub(super) fn add_likelihoods(
     let calibrated = novelty_models
         .first()
         .is_some_and(NoveltyModel::is_calibrated);
-    if calibrated && episode.len() > 1 {
+    if table.is_paced() || calibrated && episode.len() > 1 {
         return add_jointly(table, episode, novelty_models, drifting, logs, odds);
     }
     let (mut elsewhere, mut can_tell) = (0.0, true);
@@ -68,8 +68,9 @@ pub(super) fn add_likelihoods(
     Some((elsewhere, can_tell))
 }
 
-/// [`add_likelihoods`] of an episode of several movements: the squared distances of all of them have one Student's t. A
-/// movement at which a texture was never measured is for it as for a texture that the table does not have.
+/// [`add_likelihoods`] of an episode of several movements, or with slopes ([`Pace`](super::paced::Pace)): the squared
+/// distances of all movements have one Student's t. A movement at which a texture was never measured is for it as for a
+/// texture that the table does not have.
 #[inline(never)]
 fn add_jointly(
     table: &Table<'_>,
@@ -85,15 +86,35 @@ fn add_jointly(
     let features = usize::from(features);
     let odds = odds.get_mut(..logs.len())?;
     odds.fill(0.0);
-    let of_all = student_norm(features * episode.len());
-    let mut elsewhere = -of_all;
+    let calibrated = novelty_models
+        .first()
+        .is_some_and(NoveltyModel::is_calibrated);
+    let of_all = if calibrated {
+        student_norm(features * episode.len())
+    } else {
+        0.0
+    };
+    let (mut elsewhere, mut can_tell) = (-of_all, true);
     for sums in episode {
         let mean = sums.mean(features);
+        let pace = if table.is_paced() {
+            Some(sums.pace(table.slopes_at(sums.movement)?))
+        } else {
+            None
+        };
         let background = novelty_models
             .iter()
             .find(|b| b.movement == sums.movement)?;
-        let unknown = background.population_likelihood(table, &mean, sums.slides);
+        // what is not in the table goes with the speed as all textures do
+        let usual = pace.as_ref().map_or(0, |pace| pace.mean);
+        let slowed = table.at_movement_speed(None, sums.movement, &mean, usual);
+        let unknown = if calibrated {
+            background.population_likelihood(table, &slowed, sums.slides)
+        } else {
+            background.likelihood(table, &slowed, sums.slides)
+        };
         elsewhere += unknown;
+        can_tell &= background.source != Source::Nowhere;
         let column = table.column(sums.movement);
         let drifts = table.drifts(sums.movement).filter(|_| drifting);
         let mut spread: Option<Spread> = None;
@@ -108,8 +129,13 @@ fn add_jointly(
                 Some(ref last) if last.slides == slides => last,
                 _ => spread.insert(Spread::new(sums.slides, slides, features, drifts)),
             };
-            *odds += (distance(&mean, column.mean(texture), &spread.narrowness) >> 16) as f32;
-            *log += spread.norm;
+            let (known, weights) = (column.mean(texture), &spread.narrowness);
+            let (off, widening) = match &pace {
+                Some(pace) => pace.distance(texture, &mean, known, weights),
+                None => ((distance(&mean, known, weights) >> 16) as f32, 0),
+            };
+            *odds += off;
+            *log += spread.norm - widening;
         }
     }
     for ((log, odds), texture) in logs.iter_mut().zip(odds).zip(0..) {
@@ -120,11 +146,11 @@ fn add_jointly(
         let tail = weight * i64::from(ln_q16((1 << 16) + *odds as u64));
         // 512/2 times 31 in Q16: 29 bits
         *log -= (tail >> 1) as i32;
-        if taught < features * episode.len() {
+        if calibrated && taught < features * episode.len() {
             *log += q16(student_norm(taught) - of_all);
         }
     }
-    Some((elsewhere, true))
+    Some((elsewhere, can_tell))
 }
 
 /// A logarithm in Q16; none of an episode's is below -256, so that sums stay within 32 bits.

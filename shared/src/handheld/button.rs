@@ -5,7 +5,6 @@ const STEADY: u8 = 3;
 /// A press of this many ticks is a long one.
 const LONG: u8 = 60;
 
-/// A press that is over, or long.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Press {
     Short,
@@ -22,7 +21,6 @@ pub(super) struct Button {
 }
 
 impl Button {
-    /// Takes a look at the button.
     pub(super) fn tick(&mut self, pressed: bool) -> Option<Press> {
         self.other = if pressed == self.down {
             0

@@ -4,13 +4,13 @@
 use embedded_storage_async::nor_flash::NorFlash;
 
 use super::jobs::{Outcome, work};
-use super::judge::{Judgement, MOVEMENT};
+use super::judge::MOVEMENT;
 use super::screen::{About, Screen};
 use super::speed::Moved;
-use super::states::{Answer, Asked, Handheld, Job, TICKS_HZ};
+use super::states::{Answer, Handheld, Job, RequestedSlide, TICKS_HZ};
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
-use crate::probe::{Probe, RigState, TableInUse, Watch};
+use crate::probe::{Probe, RigState, Watch};
 use crate::rig::calibration::RigCalibration;
 use crate::rig::skin::SkinCare;
 use crate::rig::turning::{Turned, Turning};
@@ -98,13 +98,9 @@ pub struct ByHand<'p, H> {
     listens: bool,
     tone: Option<u16>,
     ticks: u32,
-    /// Last prompt that was sent to the host, and its time.
     prompt: (Option<Prompt>, u32),
-    /// The slide that the host wants next.
-    asked: Asked,
-    /// Share of the memory for textures that is taken.
+    asked: RequestedSlide,
     memory: f32,
-    /// True while it serves a request of the host.
     serves: bool,
 }
 
@@ -121,7 +117,7 @@ impl<'p, H: Hand> ByHand<'p, H> {
             tone: None,
             ticks: 0,
             prompt: (None, 0),
-            asked: Asked::default(),
+            asked: RequestedSlide::default(),
             memory: 0.0,
             serves: false,
         };
@@ -178,7 +174,6 @@ impl<'p, H: Hand> ByHand<'p, H> {
         self.remind();
     }
 
-    /// Turns the sensor's words on while they are wanted.
     fn heed(&mut self) {
         if self.handheld.listens() != self.listens {
             self.listens = self.handheld.listens();
@@ -197,7 +192,6 @@ impl<'p, H: Hand> ByHand<'p, H> {
         self.handheld.lose(1);
     }
 
-    /// Sends the person's task to the host.
     fn remind(&mut self) {
         let prompt = self.handheld.prompt();
         let (told, at) = self.prompt;
@@ -396,64 +390,7 @@ impl<H: Hand> RigHandle for ByHand<'_, H> {
     }
 }
 
-/// A sink that passes the probe's events on and keeps the verdict for the display.
-#[derive(Debug)]
-pub struct Shown<E> {
-    to: E,
-    judgement: Judgement,
-    /// True if there was a verdict.
-    told: bool,
-}
-
-impl<E: Events> Shown<E> {
-    /// Passes everything on to `to`.
-    pub fn new(to: E) -> Self {
-        Self {
-            to,
-            judgement: Judgement::default(),
-            told: false,
-        }
-    }
-
-    /// Takes the verdict; `None` the second time.
-    fn judgement(&mut self) -> Option<Judgement> {
-        core::mem::take(&mut self.told).then(|| core::mem::take(&mut self.judgement))
-    }
-}
-
-impl<E: Events> Events for Shown<E> {
-    fn tell(&mut self, event: Event) {
-        let judgement = &mut self.judgement;
-        match &event {
-            Event::SlideReport { posterior, .. } => {
-                judgement.leading = super::judge::leading(posterior);
-            }
-            Event::Verdict(verdict) => {
-                judgement.sure = verdict.sure;
-                judgement.changed = verdict.changed;
-                judgement.unknown = verdict.unknown;
-                self.told = true;
-            }
-            Event::Verified { now, .. } => {
-                judgement.answered(now.answer);
-                self.told = true;
-            }
-            _ => {}
-        }
-        self.to.tell(event);
-    }
-
-    fn table(&mut self, table: TableInUse) {
-        self.to.table(table);
-    }
-
-    fn go(&mut self, on: bool) {
-        self.to.go(on);
-    }
-}
-
-/// The probe in the hand of a person.
-pub type HandProbe<'m, H, F, B, E> = Probe<'m, ByHand<'m, H>, F, B, Shown<E>>;
+pub(crate) type HandProbe<'m, H, F, B, E> = Probe<'m, ByHand<'m, H>, F, B, E>;
 
 /// A hundredth of a second of the person's own use, with the job on the table, if there is one; `log` gets the outcome.
 pub async fn step<H, F, B, E>(probe: &mut HandProbe<'_, H, F, B, E>, log: impl FnMut(Outcome<'_>))
@@ -500,18 +437,17 @@ where
     }
 }
 
-/// The slides and the texture of a request that the display names.
-fn asked(command: &Command) -> (Asked, Option<Name>) {
+fn asked(command: &Command) -> (RequestedSlide, Option<Name>) {
     match command {
         Command::Identify(wanted) | Command::Verify(wanted) => (
-            Asked {
+            RequestedSlide {
                 slide: 0,
                 of: wanted.max_slides,
             },
             None,
         ),
-        Command::Train(wanted) => (Asked::default(), Some(wanted.name.clone())),
-        _ => (Asked::default(), None),
+        Command::Train(wanted) => (RequestedSlide::default(), Some(wanted.name.clone())),
+        _ => (RequestedSlide::default(), None),
     }
 }
 
@@ -527,7 +463,6 @@ where
     probe.rig.asked = slides;
     probe.rig.pause();
     probe.rig.serves = true;
-    probe.events.told = false;
     let before = probe.memory.table().ok().map(|table| table.crc());
     let done = probe.perform(&request.command).await;
     let table = probe.memory.table().ok();
@@ -540,20 +475,16 @@ where
     {
         rig.handheld.table_changed(textures);
     }
-    match (&done, trains, probe.events.judgement()) {
-        (Ok(()), Some(name), _) => rig.handheld.trained(name),
-        (Ok(()), None, Some(judgement)) => {
-            let compared = matches!(request.command, Command::Verify(_));
-            rig.handheld.told(judgement, compared);
+    let done = done.map(|found| match (trains, found) {
+        (Some(name), _) => rig.handheld.trained(name),
+        (None, Some(found)) => {
+            let compared = found.answer.is_some();
+            rig.handheld.told(found.into(), compared);
         }
-        _ => {}
-    }
-    rig.heed();
-    let id = request.id;
-    probe.events.tell(match done {
-        Ok(()) => Event::Done(id),
-        Err(why) => Event::Refused { id, why },
+        (None, None) => {}
     });
+    rig.heed();
+    probe.answer(request.id, done);
 }
 
 #[cfg(test)]

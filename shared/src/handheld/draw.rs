@@ -19,14 +19,12 @@ use super::guidance::{Again, Way, ZONE_MN};
 use super::screen::{About, Entry, Row, Screen, Trouble, first_line};
 use super::spelling::{Place, WHEEL};
 
-/// The bar's end, mN.
 const BAR_MN: f32 = 1200.0;
 /// A slide is too fast or too slow when it is off by this part of its way.
 const AHEAD: f32 = 0.15;
 const WIDTH: i32 = super::picture::WIDTH as i32;
 const MIDDLE: i32 = WIDTH / 2;
 
-/// The brush: errors are the display's.
 struct Brush<'d, D>(&'d mut D);
 
 type Done<D> = Result<(), <D as DrawTarget>::Error>;
@@ -60,25 +58,24 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
     fn write(
         &mut self,
         text: &str,
-        x: i32,
-        y: i32,
+        at: (i32, i32),
         font: &Font,
         anchor: Anchor,
         inverted: bool,
     ) -> Done<D> {
-        letters::write(self.0, text, (x, y), font, anchor, ink(inverted))
+        letters::write(self.0, text, at, font, anchor, ink(inverted))
     }
 
     fn left(&mut self, text: &str, x: i32, y: i32) -> Done<D> {
-        self.write(text, x, y, &SMALL, Anchor::Left, false)
+        self.write(text, (x, y), &SMALL, Anchor::Left, false)
     }
 
     fn right(&mut self, text: &str, y: i32) -> Done<D> {
-        self.write(text, WIDTH, y, &SMALL, Anchor::Right, false)
+        self.write(text, (WIDTH, y), &SMALL, Anchor::Right, false)
     }
 
     fn centre(&mut self, text: &str, y: i32, font: &Font) -> Done<D> {
-        self.write(text, MIDDLE, y, font, Anchor::Middle, false)
+        self.write(text, (MIDDLE, y), font, Anchor::Middle, false)
     }
 
     /// In the middle, in the largest of three fonts that it fits.
@@ -127,14 +124,12 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// Draws the page's title.
     fn title(&mut self, title: &str, right: &str) -> Done<D> {
         self.fill(0, 0, WIDTH, 12, false)?;
-        self.write(title, 3, 1, &SMALL, Anchor::Left, true)?;
-        self.write(right, WIDTH - 3, 1, &SMALL, Anchor::Right, true)
+        self.write(title, (3, 1), &SMALL, Anchor::Left, true)?;
+        self.write(right, (WIDTH - 3, 1), &SMALL, Anchor::Right, true)
     }
 
-    /// Draws the button's actions: pressed, and held.
     fn button(&mut self, press: &str, hold: &str) -> Done<D> {
         if !press.is_empty() {
             self.disc(4, 59, 2, false)?;
@@ -150,7 +145,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         Ok(())
     }
 
-    /// Draws the force and its zone.
     fn force(&mut self, force_mn: f32, y: i32) -> Done<D> {
         const INSIDE: i32 = WIDTH - 4;
         let x = |mn: f32| 2 + (INSIDE as f32 * (mn / BAR_MN).clamp(0.0, 1.0)) as i32;
@@ -165,7 +159,6 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.fill(low, y - 4, high - low, 1, false)
     }
 
-    /// The three leading textures.
     fn rows(&mut self, rows: &[Row<'_>], y: i32) -> Done<D> {
         for (row, y) in rows.iter().zip((y..).step_by(11)) {
             self.left(&cut(row.name, 11), 0, y)?;
@@ -205,18 +198,15 @@ fn count(slide: u8, of: u8) -> String<40> {
     }
 }
 
-/// The leading texture, if it is worth a line.
 fn perhaps(rows: &[Row<'_>]) -> String<40> {
     let name = rows.first().map_or("?", |row| row.name);
     say(format_args!("{}?", cut(name, 20)))
 }
 
-/// A name in a line of its own.
 fn below(name: &str) -> String<40> {
     say(format_args!(" {}", cut(name, 20)))
 }
 
-/// Writes a short text.
 fn say(text: core::fmt::Arguments<'_>) -> String<40> {
     let mut said = String::new();
     // cut off if it is too long
@@ -225,9 +215,6 @@ fn say(text: core::fmt::Arguments<'_>) -> String<40> {
 }
 
 /// Draws a screen onto a dark display.
-///
-/// # Errors
-/// The display's.
 pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &mut D) -> Done<D> {
     let brush = &mut Brush(display);
     match screen {
@@ -245,14 +232,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             down,
         } => {
             brush.title("Press", &count(*slide, *of))?;
-            let order = match *force_mn {
-                _ if !down => "Press",
-                mn if mn < *ZONE_MN.start() => "Harder",
-                mn if mn > *ZONE_MN.end() => "Lighter",
-                _ => "Hold still",
-            };
-            brush.centre(order, 15, &LARGE)?;
-            brush.force(*force_mn, 42)
+            brush.press(*force_mn, *down)
         }
         Screen::Slide {
             slide,
@@ -275,21 +255,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         }
         Screen::Weigh { mn, force_mn } => brush.weigh(*mn, *force_mn),
         Screen::Turn { over } => brush.turn(*over),
-        Screen::Again { why, lift } => {
-            brush.title("Again", "")?;
-            brush.headline(why.why(), 17)?;
-            let (first, second) = match why {
-                Again::TooHard | Again::TooLight => ("Keep the bar", "between the posts"),
-                Again::TooShort => ("Slide on until", "the bar is full"),
-                Again::TooUneven => ("Slide at one pace,", "as the bar fills"),
-                Again::Disturbed => ("A sample was lost", ""),
-            };
-            if *lift {
-                return brush.centre("Lift the finger", 46, &BOLD);
-            }
-            brush.centre(first, 40, &SMALL)?;
-            brush.centre(second, 51, &SMALL)
-        }
+        Screen::Again { why, lift } => brush.again(*why, *lift),
         Screen::Thinking { slide } => {
             brush.title("Thinking", &say(format_args!("slide {slide}")))?;
             for (x, radius) in [(44, 4), (64, 6), (84, 4)] {
@@ -297,53 +263,15 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             }
             Ok(())
         }
-        Screen::Verdict { rows, sure, open } => {
-            if *sure {
-                brush.headline(rows.first().map_or("?", |row| row.name), -1)?;
-            } else {
-                brush.headline(&perhaps(rows), -1)?;
-            }
-            brush.rows(rows, 20)?;
-            if *open {
-                brush.left("Slide on to be sure", 0, 42)?;
-            }
-            brush.button("next", "teach")
-        }
-        Screen::Changed { rows } => {
-            brush.headline(&perhaps(rows), -1)?;
-            let like = "Feels like it, but";
-            brush.lines([like, "not as I learned it.", "Is it the same one?"])?;
-            brush.button("no", "yes")
-        }
-        Screen::Unknown { like } => {
-            brush.headline("Unknown", -1)?;
-            let nearest = below(like.first().map_or("?", |row| row.name));
-            brush.lines(["None of those I know.", "The nearest one is", &nearest])?;
-            brush.button("next", "teach")
-        }
+        Screen::Verdict { rows, sure, open } => brush.verdict(rows, *sure, *open),
+        Screen::Changed { rows } => brush.changed(rows),
+        Screen::Unknown { like } => brush.unknown(like),
         Screen::Compared {
             name,
             same,
             open,
             trials,
-        } => {
-            // fewer than `ENOUGH_TRIALS` are shown
-            let next = match trials {
-                1 => "learned from 1 slide",
-                2 => "learned from 2 slides",
-                _ => "Touch the next one.",
-            };
-            let may = "It may or may not be";
-            let (is, how, hint) = match (same, open) {
-                (Some(true), _) => ("Same", "It feels like", next),
-                (Some(false), _) => ("Different", "It does not feel like", next),
-                (None, true) => ("Not sure yet", may, "Slide again."),
-                (None, false) => ("Not sure", may, "The slides cannot say"),
-            };
-            brush.headline(is, -1)?;
-            brush.lines([how, &below(name), hint])?;
-            brush.button("end", "other")
-        }
+        } => brush.compared(name, *same, *open, *trials),
         Screen::Choose {
             title,
             at,
@@ -356,18 +284,7 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
             brush.headline("Learning", 18)?;
             brush.centre("Leave it on", 42, &SMALL)
         }
-        Screen::Learned(Ok(name)) => {
-            brush.title("Learned", "")?;
-            brush.headline(name, 16)?;
-            // a tick
-            for step in 0..=7 {
-                brush.fill(54 + step, 48 + step, 1, 3, false)?;
-            }
-            for step in 0..=14 {
-                brush.fill(61 + step, 55 - step, 1, 3, false)?;
-            }
-            Ok(())
-        }
+        Screen::Learned(Ok(name)) => brush.learned(name),
         Screen::Learned(Err(why)) => brush.sentence("Not learned", why),
         Screen::Fault(trouble) => brush.fault(trouble),
         Screen::About(about) => brush.about_probe(about),
@@ -378,8 +295,93 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
     }
 }
 
-/// The screens that take more than a few lines.
 impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
+    fn press(&mut self, force_mn: f32, down: bool) -> Done<D> {
+        let order = match force_mn {
+            _ if !down => "Press",
+            mn if mn < *ZONE_MN.start() => "Harder",
+            mn if mn > *ZONE_MN.end() => "Lighter",
+            _ => "Hold still",
+        };
+        self.centre(order, 15, &LARGE)?;
+        self.force(force_mn, 42)
+    }
+
+    fn changed(&mut self, rows: &[Row<'_>]) -> Done<D> {
+        self.headline(&perhaps(rows), -1)?;
+        let like = "Feels like it, but";
+        self.lines([like, "not as I learned it.", "Is it the same one?"])?;
+        self.button("no", "yes")
+    }
+
+    fn unknown(&mut self, like: &[Row<'_>]) -> Done<D> {
+        self.headline("Unknown", -1)?;
+        let nearest = below(like.first().map_or("?", |row| row.name));
+        self.lines(["None of those I know.", "The nearest one is", &nearest])?;
+        self.button("next", "teach")
+    }
+
+    fn again(&mut self, why: Again, lift: bool) -> Done<D> {
+        self.title("Again", "")?;
+        self.headline(why.why(), 17)?;
+        let (first, second) = match why {
+            Again::TooHard | Again::TooLight => ("Keep the bar", "between the posts"),
+            Again::TooShort => ("Slide on until", "the bar is full"),
+            Again::TooUneven => ("Slide at one pace,", "as the bar fills"),
+            Again::Disturbed => ("A sample was lost", ""),
+        };
+        if lift {
+            return self.centre("Lift the finger", 46, &BOLD);
+        }
+        self.centre(first, 40, &SMALL)?;
+        self.centre(second, 51, &SMALL)
+    }
+
+    fn verdict(&mut self, rows: &[Row<'_>], sure: bool, open: bool) -> Done<D> {
+        if sure {
+            self.headline(rows.first().map_or("?", |row| row.name), -1)?;
+        } else {
+            self.headline(&perhaps(rows), -1)?;
+        }
+        self.rows(rows, 20)?;
+        if open {
+            self.left("Slide on to be sure", 0, 42)?;
+        }
+        self.button("next", "teach")
+    }
+
+    fn compared(&mut self, name: &str, same: Option<bool>, open: bool, trials: u8) -> Done<D> {
+        // fewer than `ENOUGH_TRIALS` are shown
+        let next = match trials {
+            1 => "learned from 1 slide",
+            2 => "learned from 2 slides",
+            _ => "Touch the next one.",
+        };
+        let may = "It may or may not be";
+        let (is, how, hint) = match (same, open) {
+            (Some(true), _) => ("Same", "It feels like", next),
+            (Some(false), _) => ("Different", "It does not feel like", next),
+            (None, true) => ("Not sure yet", may, "Slide again."),
+            (None, false) => ("Not sure", may, "The slides cannot say"),
+        };
+        self.headline(is, -1)?;
+        self.lines([how, &below(name), hint])?;
+        self.button("end", "other")
+    }
+
+    fn learned(&mut self, name: &str) -> Done<D> {
+        self.title("Learned", "")?;
+        self.headline(name, 16)?;
+        // a tick
+        for step in 0..=7 {
+            self.fill(54 + step, 48 + step, 1, 3, false)?;
+        }
+        for step in 0..=14 {
+            self.fill(61 + step, 55 - step, 1, 3, false)?;
+        }
+        Ok(())
+    }
+
     fn ready(&mut self, textures: u16) -> Done<D> {
         let ending = if textures == 1 { "" } else { "s" };
         self.title("Tactus", &say(format_args!("{textures} texture{ending}")))?;
@@ -395,8 +397,8 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         {
             self.fill(x + step, 49 - step, 1, 1, false)?;
         }
-        self.write("Press", 44, 13, &LARGE, Anchor::Left, false)?;
-        self.write("and hold", 44, 31, &LARGE, Anchor::Left, false)?;
+        self.write("Press", (44, 13), &LARGE, Anchor::Left, false)?;
+        self.write("and hold", (44, 31), &LARGE, Anchor::Left, false)?;
         self.button("menu", "teach")
     }
 
@@ -444,14 +446,14 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
                 Entry::Text(text) => cut(text, 21),
                 Entry::Numbered(name) => say(format_args!("new: {name}")),
             };
-            self.write(&text, 1, y - 1, &SMALL, Anchor::Left, chosen)?;
+            self.write(&text, (1, y - 1), &SMALL, Anchor::Left, chosen)?;
         }
         self.button("next", "take")
     }
 
     fn spell(&mut self, text: &str, wheel: &[Place; WHEEL]) -> Done<D> {
         self.title("Spell it", "")?;
-        self.write(text, 1, 15, &BOLD, Anchor::Left, false)?;
+        self.write(text, (1, 15), &BOLD, Anchor::Left, false)?;
         let cursor = 1 + 7 * text.chars().count() as i32;
         self.fill(cursor, 29, 6.min(WIDTH - cursor), 2, false)?;
         for (place, n) in wheel.iter().zip(0..) {
@@ -471,7 +473,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
                     (letter.as_str(), &LARGE, 33)
                 }
             };
-            self.write(text, x, y, font, Anchor::Middle, chosen)?;
+            self.write(text, (x, y), font, Anchor::Middle, chosen)?;
         }
         self.button("next", "take")
     }
@@ -488,7 +490,7 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.triangle(12, 16, 13, true)?;
         self.fill(11, 19, 3, 5, true)?;
         self.fill(11, 26, 3, 2, true)?;
-        self.write(what, 28, 19, &BOLD, Anchor::Left, false)?;
+        self.write(what, (28, 19), &BOLD, Anchor::Left, false)?;
         self.centre(first, 41, &SMALL)?;
         self.centre(second, 52, &SMALL)
     }
@@ -523,13 +525,11 @@ impl<D: DrawTarget<Color = BinaryColor>> Brush<'_, D> {
         self.button("go on", "")
     }
 
-    /// A name and its value.
     fn row(&mut self, name: &str, value: &str, y: i32) -> Done<D> {
         self.left(name, 1, y)?;
         self.right(value, y)
     }
 
-    /// Three lines below a headline.
     fn lines(&mut self, lines: [&str; 3]) -> Done<D> {
         for (line, y) in lines.iter().zip((19..).step_by(11)) {
             self.left(line, 1, y)?;

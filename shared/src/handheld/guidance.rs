@@ -5,7 +5,7 @@ use core::ops::RangeInclusive;
 use crate::features::Observation;
 
 /// The zone of force to keep, mN: about [`super::judge::MOVEMENT`]'s, as wide as people hold it without looking.
-pub const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;
+pub(crate) const ZONE_MN: RangeInclusive<f32> = 300.0..=750.0;
 
 pub use crate::wire::Again;
 

@@ -76,7 +76,6 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>>(
     }
 }
 
-/// Learns the episode that was judged last, as the texture that was chosen.
 async fn teach<F: NorFlash, B: StoredBytes<F>>(
     choice: Choice,
     memory: &mut Memory<'_, F, B>,

@@ -3,10 +3,10 @@
 use heapless::Vec;
 
 use crate::explorer::{
-    Answer, Config, EpisodeSummary, Explorer, ExplorerError, Method, ObserveError,
+    Answer, Config, EpisodeSummary, Explorer, ExplorerError, LEADING, Method, ObserveError,
 };
 use crate::features::{FeatureSet, Movement, Observation, PropertySet};
-use crate::probe::candidates;
+use crate::probe::{Identification, candidates};
 use crate::table::{Action, MAX_TEXTURES, Name, Table};
 
 /// The person's movement: half a newton, 25 mm/s.
@@ -18,9 +18,6 @@ pub const ASK_AFTER: usize = 5;
 /// Slides after which the probe asks for no more: in the simulated world the next two identify 1 % more textures, or 2
 /// %.
 pub const MAX_SLIDES: usize = 10;
-/// Textures that a verdict shows.
-pub const LEADING: usize = 3;
-
 /// The judgement of an episode. Where the question is whether it is one texture, that is the leading one: it is `sure`
 /// where it is the same, and `unknown` where it is different.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -37,9 +34,24 @@ pub struct Judgement {
     pub open: bool,
 }
 
+impl From<Identification> for Judgement {
+    fn from(found: Identification) -> Self {
+        let mut judgement = Self {
+            leading: found.leading,
+            sure: found.verdict.sure,
+            unknown: found.verdict.unknown,
+            changed: found.verdict.changed,
+            open: false,
+        };
+        if let Some(answer) = found.answer {
+            judgement.answered(answer);
+        }
+        judgement
+    }
+}
+
 impl Judgement {
-    /// The question was whether it is the first one, and this is the answer.
-    pub(super) fn answered(&mut self, answer: Answer) {
+    fn answered(&mut self, answer: Answer) {
         self.sure = answer == Answer::Same;
         self.unknown = answer == Answer::Different;
         self.changed = false;
@@ -71,9 +83,7 @@ pub enum JudgeError {
 /// Compares the slides of an episode with every texture of the table, or with `reference` alone: is it that one?
 /// Returns the judgement to show and the summary that the probe can learn from. The share of false alarms is the
 /// table's own, unless given.
-///
-/// # Errors
-/// The table is not one for a handheld probe, or a slide lacks a feature.
+/// Errors: the table is not one for a handheld probe, or a slide lacks a feature.
 pub fn judge(
     table: Table<'_>,
     slides: &[Observation],
@@ -88,9 +98,6 @@ pub fn judge(
 }
 
 /// The same where `most` slides, up to 255, are the last ones, sure or not.
-///
-/// # Errors
-/// See [`judge`].
 pub fn judge_at_most(
     table: Table<'_>,
     slides: &[Observation],
@@ -121,7 +128,7 @@ pub fn judge_at_most(
     let best = explorer.best();
     let verdict = explorer.end();
     let mut judgement = Judgement {
-        leading: leading(explorer.posterior()),
+        leading: explorer.leading(),
         sure: verdict.is_some_and(|verdict| verdict.sure),
         unknown: verdict.is_some_and(|verdict| verdict.unknown),
         changed: verdict.is_some_and(|verdict| verdict.changed),
@@ -141,23 +148,6 @@ pub fn judge_at_most(
     Ok((judgement, episode))
 }
 
-/// The most probable textures, the first one leading.
-pub(super) fn leading(posterior: &[f32]) -> Vec<(u16, f32), LEADING> {
-    let mut leading: Vec<(u16, f32), LEADING> = Vec::new();
-    for (&probability, texture) in posterior.iter().zip(0..) {
-        let place = leading
-            .iter()
-            .position(|(_, other)| probability > *other)
-            .unwrap_or(leading.len());
-        if place < LEADING {
-            leading.truncate(leading.len().min(LEADING - 1));
-            // one place is free now, and `place` is at most the end
-            let _ = leading.insert(place, (texture, probability));
-        }
-    }
-    leading
-}
-
 /// The movement of the table that the person makes: the one nearest to [`MOVEMENT`] is the only one in a handheld's
 /// table.
 fn movement(table: &Table<'_>) -> Option<u8> {
@@ -169,13 +159,12 @@ fn movement(table: &Table<'_>) -> Option<u8> {
         .map(|(_, index)| index)
 }
 
-/// From how many slides a texture was learned.
 pub(super) fn trials(table: &Table<'_>, texture: u16) -> u8 {
     movement(table).map_or(0, |movement| table.trials(texture, movement))
 }
 
 /// A name for a texture that the person does not want to spell: the first of "sample 1", "sample 2" that is free.
-pub fn free_name(table: &Table<'_>) -> Name {
+pub(crate) fn free_name(table: &Table<'_>) -> Name {
     use core::fmt::Write as _;
     let numbered = |number: u32| {
         let mut name = Name::new();

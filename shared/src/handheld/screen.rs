@@ -3,8 +3,8 @@
 use heapless::Vec;
 
 use super::guidance::{Again, Phase, View, Way};
-use super::judge::LEADING;
 use super::spelling::{Place, WHEEL};
+use crate::explorer::LEADING;
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
 use crate::table::Name;
@@ -210,7 +210,7 @@ impl Screen<'_> {
 }
 
 /// The first entry that is shown of a list, so that the chosen one is.
-pub fn first_line(at: u16, count: u16) -> u16 {
+pub(crate) fn first_line(at: u16, count: u16) -> u16 {
     let lines = LINES as u16;
     at.saturating_sub(1).min(count.saturating_sub(lines))
 }

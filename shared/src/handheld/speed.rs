@@ -13,19 +13,16 @@ const MOVES_MM: f32 = 0.25;
 /// Counts along both axes since the reading before; `None` where the surface was not seen.
 pub type Moved = Option<[i16; 2]>;
 
-/// Follows the readings of a sensor, a hundred in a second.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Speedometer {
     latest: Deque<Moved, LATEST>,
     /// Counts of the slide so far, and those before its steady part.
     counts: [i32; 2],
     before: [i32; 2],
-    /// All readings of the slide saw the surface.
     seen: bool,
 }
 
 impl Speedometer {
-    /// Takes a reading.
     pub(super) fn take(&mut self, moved: Moved) {
         if self.latest.is_full() {
             let _ = self.latest.pop_front();
@@ -36,7 +33,6 @@ impl Speedometer {
         add(&mut self.counts, moved);
     }
 
-    /// Returns true if there is a sensor: a reading has come.
     pub(super) fn is_there(&self) -> bool {
         !self.latest.is_empty()
     }
@@ -52,12 +48,10 @@ impl Speedometer {
         known.then(|| way_mm(counts) > MOVES_MM)
     }
 
-    /// A slide begins.
     pub(super) fn begin(&mut self) {
         (self.counts, self.before, self.seen) = ([0; 2], [0; 2], true);
     }
 
-    /// Its steady part begins.
     pub(super) fn steady(&mut self) {
         self.before = self.counts;
     }
@@ -84,7 +78,6 @@ fn add(counts: &mut [i32; 2], moved: Moved) {
     }
 }
 
-/// The way of so many counts along both axes, mm.
 fn way_mm(counts: [i32; 2]) -> f32 {
     let [x, y] = counts.map(|c| c as f32);
     libm::sqrtf(x * x + y * y) / COUNTS_PER_MM

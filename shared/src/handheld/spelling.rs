@@ -13,7 +13,6 @@ const MOST: usize = 14;
 /// Places that are shown at once.
 pub const WHEEL: usize = 7;
 
-/// Result of a long press.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Taken {
     /// The name has changed.
@@ -35,7 +34,6 @@ pub enum Place {
     Letter(char),
 }
 
-/// A name that is being spelled.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Spelling {
     name: Name,

@@ -11,12 +11,13 @@ use self::lists::{Entries, List};
 
 use super::button::Button;
 use super::guidance::{Again, Event};
-use super::judge::{ASK_AFTER, JudgeError, Judgement, LEADING, MAX_SLIDES, trials};
+use super::judge::{ASK_AFTER, JudgeError, Judgement, MAX_SLIDES, trials};
 use super::screen::{About, Row, Screen, Trouble};
 use super::speed::Moved;
 use super::spelling::Spelling;
 use super::touch::Touch;
 use crate::dsp::Plan;
+use crate::explorer::LEADING;
 use crate::features::Observation;
 use crate::rig::turning::Turned;
 use crate::rig::weigh::ForceScale;
@@ -59,7 +60,7 @@ pub enum Job {
 
 /// The slide that the host wants.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Asked {
+pub struct RequestedSlide {
     /// Its number, from 1.
     pub slide: u8,
     /// Largest number of slides; 0 if unknown.
@@ -79,7 +80,6 @@ pub enum Answer {
     Trouble,
 }
 
-/// A page of the display.
 #[derive(Clone, PartialEq, Debug)]
 enum Page {
     /// Nothing begun.
@@ -126,27 +126,21 @@ pub struct Handheld<'p> {
     shown: u32,
     idle: u32,
     silent: u32,
-    /// The slides of this episode that were good.
     episode: Vec<Observation, MAX_SLIDES>,
-    /// Their last judgement.
     judgement: Option<Judgement>,
     /// The slides are for learning, not for identifying.
     training: bool,
-    /// The only texture to compare them with, if the person chose one.
     reference: Option<u16>,
     /// The go / no-go output is to be set.
     go: Option<bool>,
-    /// Textures of the table.
     textures: u16,
-    /// Its finger feels gravity.
     pub(super) turns: bool,
     job: Option<Job>,
     melody: &'static [Note],
     note: u8,
-    /// The page was changed and not drawn since.
     fresh: bool,
     /// The host's slide, and the result of its request.
-    asked: Option<Asked>,
+    asked: Option<RequestedSlide>,
     answer: Option<Answer>,
 }
 
@@ -205,7 +199,6 @@ impl<'p> Handheld<'p> {
         self.touch.lose(words);
     }
 
-    /// Ends the host's request.
     fn end(&mut self, answer: Answer) {
         self.answer = Some(answer);
         self.asked = None;
@@ -264,7 +257,6 @@ impl<'p> Handheld<'p> {
         self.show(Page::Verdict);
     }
 
-    /// Compares the next slides with this texture.
     fn compare(&mut self, reference: u16) {
         self.clear_episode();
         self.reference = Some(reference);
@@ -344,7 +336,7 @@ impl<'p> Handheld<'p> {
     }
 
     /// Returns true if the display names textures, so that [`Handheld::screen`] needs the table.
-    pub fn names_textures(&self) -> bool {
+    pub(crate) fn names_textures(&self) -> bool {
         matches!(self.page, Page::Verdict | Page::Choose(..))
     }
 
@@ -362,15 +354,7 @@ impl<'p> Handheld<'p> {
                 })
                 .collect()
         };
-        let (slide, of) = match &self.asked {
-            Some(asked) => (asked.slide, asked.of),
-            None if self.training => (self.episode.len() as u8 + 1, TRAINING_SLIDES as u8),
-            None => {
-                let goes_on = self.episode.len() >= ASK_AFTER && self.reference.is_none();
-                let of = if goes_on { MAX_SLIDES } else { ASK_AFTER };
-                (self.episode.len() as u8 + 1, of as u8)
-            }
-        };
+        let (slide, of) = self.slide_number();
         match &self.page {
             Page::Ready if !self.touch.has_zero() => Screen::Air,
             Page::Ready => Screen::Ready {
@@ -433,6 +417,19 @@ impl<'p> Handheld<'p> {
         }
     }
 
+    /// The slide that is made next, and the largest number of slides.
+    fn slide_number(&self) -> (u8, u8) {
+        match &self.asked {
+            Some(asked) => (asked.slide, asked.of),
+            None if self.training => (self.episode.len() as u8 + 1, TRAINING_SLIDES as u8),
+            None => {
+                let goes_on = self.episode.len() >= ASK_AFTER && self.reference.is_none();
+                let of = if goes_on { MAX_SLIDES } else { ASK_AFTER };
+                (self.episode.len() as u8 + 1, of as u8)
+            }
+        }
+    }
+
     fn entries(&self, list: List) -> Entries<'_> {
         Entries {
             list,
@@ -472,7 +469,6 @@ impl<'p> Handheld<'p> {
         self.training = false;
     }
 
-    /// A new episode may begin.
     fn begin(&mut self) {
         self.clear_episode();
         self.reference = None;

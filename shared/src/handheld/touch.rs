@@ -71,7 +71,6 @@ pub struct Taken {
 /// Follows touches.
 pub struct Touch<'p> {
     plan: &'p Plan,
-    /// Contact force of one count of P_DC, mN.
     mn_per_count: f32,
     taken: Taken,
     slide: Slide<'p>,
@@ -96,7 +95,6 @@ pub struct Touch<'p> {
     /// Unreadable words in a row; equal samples of P_AC, and that sample.
     unreadable: u16,
     equal: u16,
-    /// The last two samples of P_AC.
     before: [i16; 2],
     /// P_DC in the air, and the number of whole blocks in its mean.
     zero: f32,
@@ -104,7 +102,6 @@ pub struct Touch<'p> {
     /// P_AC in the air: mean and liveliness.
     rest: f32,
     air: f32,
-    /// Mean P_DC of the latest blocks.
     forces: Deque<f32, STEADY_FORCE>,
     /// Blocks in a row that are down, or up.
     changes: u8,
@@ -184,7 +181,7 @@ impl<'p> Touch<'p> {
     }
 
     /// Mean P_DC of the latest 100 ms in counts above that in the air; `None` before it is known.
-    pub fn counts_above_air(&self) -> Option<f32> {
+    pub(crate) fn counts_above_air(&self) -> Option<f32> {
         let known = self.has_zero() && self.forces.is_full();
         let sum: f32 = self.forces.iter().sum();
         known.then(|| sum / self.forces.len() as f32 - self.zero)
@@ -195,13 +192,11 @@ impl<'p> Touch<'p> {
         self.has_zero().then_some(self.zero)
     }
 
-    /// Returns true if P_DC in the air is known.
-    pub fn has_zero(&self) -> bool {
+    pub(crate) fn has_zero(&self) -> bool {
         self.zeroed >= ZEROING
     }
 
-    /// Returns true if the finger is down.
-    pub fn is_down(&self) -> bool {
+    pub(crate) fn is_down(&self) -> bool {
         self.phase != Phase::Air
     }
 
@@ -278,7 +273,6 @@ impl<'p> Touch<'p> {
         event
     }
 
-    /// Counts equal samples of P_AC.
     fn hangs(&mut self, counts: i16) -> Option<Event> {
         let [.., last] = self.before;
         let last = self.pac.last().copied().unwrap_or(last);
@@ -286,7 +280,6 @@ impl<'p> Touch<'p> {
         (self.equal >= FROZEN).then_some(Event::Frozen)
     }
 
-    /// Mean of the latest forces, mN.
     fn force_mn(&self) -> f32 {
         if self.zeroed < ZEROING || self.forces.is_empty() {
             return 0.0;
@@ -355,7 +348,6 @@ impl<'p> Touch<'p> {
         }
     }
 
-    /// A block with a gap.
     fn broken(&mut self, first: bool) -> Option<Event> {
         match self.phase {
             Phase::Press => {
@@ -434,7 +426,6 @@ impl<'p> Touch<'p> {
         about
     }
 
-    /// Gives P_AC of the touch to its slide.
     fn put(&mut self, phase: &SamplePhase, pac: &[i16]) {
         if let Some(block) = self.blocks.put(phase, pac, None) {
             self.take(block);
@@ -549,7 +540,6 @@ impl<'p> Touch<'p> {
         Some(self.finish())
     }
 
-    /// The slide is over.
     fn finish(&mut self) -> Event {
         self.phase = Phase::Lift;
         if deviation(&self.tenths) > UNEVEN {

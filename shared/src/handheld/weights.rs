@@ -15,9 +15,7 @@ use crate::wire::Failure;
 
 /// Weights as a kitchen scale shows them, 30, 60, 90, 120 and 150 g, as forces in mN.
 pub const WEIGHTS_MN: [u16; 5] = [294, 588, 883, 1177, 1471];
-/// Text of the display if the store fails.
 const NOT_KEPT: &str = "Not kept. Restart it.";
-/// Text of the display if P_DC falls under a weight.
 const FALLS: &str = "P_DC falls. Swap the cell's wires.";
 
 impl<H: Hand> ByHand<'_, H> {

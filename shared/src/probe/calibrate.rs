@@ -9,8 +9,8 @@ use crate::rig::{Fault, Phase, RigError};
 use crate::store::{Store, StoreError};
 use crate::wire::Failure;
 
-/// P_DC in the air may move so far while it is measured, counts: what a rig that waits allows in that time, 30 a minute. One that has
-/// moved farther, and moves back, would be that of a finger that is pressed.
+/// P_DC in the air may move so far while it is measured, counts: what a rig that waits allows in that time, 30 a
+/// minute. One that has moved farther, and moves back, would be that of a finger that is pressed.
 const DRIFT_COUNTS: f32 = 20.0;
 
 /// Measures the motor's current without load and P_DC in the air, and uses them from now on.
@@ -79,10 +79,8 @@ pub(crate) async fn keep<F: NorFlash>(
     store.set_calibration(calibration).await
 }
 
-/// Gives the rig its skin, its largest force and its calibration as they are stored; each whatever becomes of the others.
-///
-/// # Errors
-/// One of them cannot be read, or another record of the settings is damaged.
+/// Gives the rig its skin, its largest force and its calibration as they are stored; each whatever becomes of the
+/// others. Errors: one of them cannot be read, or another record of the settings is damaged.
 pub async fn restore<F: NorFlash, R: RigHandle>(
     store: &mut Store<F>,
     rig: &mut R,

@@ -1,5 +1,5 @@
-//! Every request, once: what is answered at any time, what waits for its turn, what is refused because the probe is busy;
-//! and what is done when its turn has come.
+//! Every request, once: what is answered at any time, what waits for its turn, what is refused because the probe is
+//! busy; and what is done when its turn has come.
 
 use core::pin::pin;
 
@@ -7,14 +7,13 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::memory::Memory;
 use super::seams::{Events, Panel, RigHandle, StoredBytes};
-use super::{calibrate, identify, teach, train, transfer};
+use super::{Identification, calibrate, identify, teach, train, transfer};
 use crate::dsp::Plan;
 use crate::explorer::Answer;
 use crate::rig::Phase;
 use crate::rig::calibration::RigCalibration;
-use crate::rig::turning::Turned;
 use crate::table::is_false_alarm;
-use crate::wire::{Command, Event, Failure, Request, Status};
+use crate::wire::{Command, Event, Failure, Identify, Request, Status};
 
 /// When a request is dealt with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -69,7 +68,6 @@ pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
     turn
 }
 
-/// How the probe is.
 fn status(panel: &impl Panel) -> Status {
     let (rig, table) = (panel.rig(), panel.table());
     Status {
@@ -94,7 +92,6 @@ fn status(panel: &impl Panel) -> Status {
     }
 }
 
-/// The event that reports these constants to the host.
 fn told(calibration: &RigCalibration) -> Event {
     Event::Calibration(calibration.to_bytes())
 }
@@ -120,90 +117,154 @@ where
 {
     /// Does what was asked for, as [`turn`] had it queued, and says that it is done or why it is not.
     pub async fn serve(&mut self, request: &Request) {
-        let done = self.perform(&request.command).await;
-        let id = request.id;
+        let done = self.perform(&request.command).await.map(|_| ());
+        self.answer(request.id, done);
+    }
+
+    pub(crate) fn answer(&mut self, id: u16, done: Result<(), Failure>) {
         self.events.tell(match done {
             Ok(()) => Event::Done(id),
             Err(why) => Event::Refused { id, why },
         });
     }
 
-    /// Does what was asked for.
-    ///
-    /// # Errors
-    /// The reply: why it was not done.
-    pub async fn perform(&mut self, command: &Command) -> Result<(), Failure> {
+    /// Does what was asked for; an exploration has a result.
+    pub async fn perform(&mut self, command: &Command) -> Result<Option<Identification>, Failure> {
+        match command {
+            Command::Identify(wanted) => return self.identify(wanted, false).await.map(Some),
+            Command::Verify(wanted) => return self.identify(wanted, true).await.map(Some),
+            Command::Label(name) => self.memory.label(name, &mut self.events).await?,
+            Command::Train(_) | Command::Rename { .. } | Command::Forget(_) => {
+                self.learn(command).await?;
+            }
+            Command::ReadTable(_)
+            | Command::BeginTable(_)
+            | Command::WriteTable { .. }
+            | Command::CommitTable
+            | Command::FactoryTable
+            | Command::SetFalseAlarm(_) => self.transfer(command).await?,
+            _ => self.use_rig(command).await?,
+        }
+        Ok(None)
+    }
+
+    async fn identify(
+        &mut self,
+        wanted: &Identify,
+        verify: bool,
+    ) -> Result<Identification, Failure> {
         let Self {
             rig,
             memory,
             events,
             plan,
         } = self;
+        if verify {
+            events.go(false);
+        }
+        memory.episode = None;
+        rig.begin(wanted.seed).await;
+        let table = memory.table()?;
+        let mut config = wanted.config(table.contents());
+        config.verify = verify;
+        config.false_alarm = config.false_alarm.or(memory.false_alarm);
+        let tell = |event| events.tell(event);
+        // awaited where it lies: moving it would take its size of the stack, twice
+        let done = pin!(identify(wanted, config, rig, table, plan, tell)).await;
+        memory.keep_skin(&rig.state().skin).await;
+        let (episode, found) = done?;
+        if verify {
+            let same = found.answer == Some(Answer::Same);
+            events.go(same);
+        } else if wanted.learn {
+            memory.learn_by_itself(&episode, events).await;
+        }
+        memory.episode = Some(episode);
+        Ok(found)
+    }
+
+    async fn learn(&mut self, command: &Command) -> Result<(), Failure> {
+        let Self {
+            rig,
+            memory,
+            events,
+            plan,
+        } = self;
+        if let Command::Train(wanted) = command {
+            memory.episode = None;
+            rig.begin(wanted.seed).await;
+        }
+        let (store, base, buffer) = memory.lend()?;
+        let done = match command {
+            Command::Rename { from, to } => {
+                let done = teach::rename(from, to, &base, store, buffer).await;
+                done.map_err(Failure::from)
+            }
+            Command::Forget(what) => {
+                let done = teach::delete(what, &base, store, buffer).await;
+                done.map_err(Failure::from)
+            }
+            Command::Train(wanted) => {
+                let tell = |event| events.tell(event);
+                train(wanted, rig, (store, base, buffer), plan, tell).await
+            }
+            _ => Ok(()),
+        };
+        memory.reload(events).await;
+        if let Command::Train(_) = command {
+            memory.keep_skin(&rig.state().skin).await;
+        }
+        done
+    }
+
+    async fn transfer(&mut self, command: &Command) -> Result<(), Failure> {
+        let Self { memory, events, .. } = self;
+        let done: Result<(), Failure> = match command {
+            Command::ReadTable(offset) => {
+                let part = transfer::read(memory.in_force(), *offset);
+                events.tell(part.ok_or(Failure::NoSuchByte)?);
+                return Ok(());
+            }
+            Command::BeginTable(length) => {
+                return Ok(memory.store()?.begin_table(*length as usize).await?);
+            }
+            Command::WriteTable { offset, bytes } => {
+                return Ok(transfer::write(memory.store()?, *offset, bytes).await?);
+            }
+            Command::CommitTable => memory.commit().await.map_err(Failure::from),
+            Command::SetFalseAlarm(share) if !share.is_none_or(is_false_alarm) => {
+                return Err(Failure::FalseAlarm);
+            }
+            Command::SetFalseAlarm(share) => {
+                let done = memory.store()?.set_false_alarm(*share).await;
+                done.map_err(Failure::from)
+            }
+            _ => {
+                let done = memory.store()?.factory_table().await;
+                done.map_err(Failure::from)
+            }
+        };
+        memory.reload(events).await;
+        done
+    }
+
+    async fn use_rig(&mut self, command: &Command) -> Result<(), Failure> {
+        let Self {
+            rig,
+            memory,
+            events,
+            ..
+        } = self;
         match command {
             Command::Home => {
                 memory.episode = None;
-                rig.home().await.map_err(Failure::Rig)
-            }
-            Command::Identify(wanted) | Command::Verify(wanted) => {
-                let verify = matches!(command, Command::Verify(_));
-                if verify {
-                    events.go(false);
-                }
-                memory.episode = None;
-                rig.begin(wanted.seed).await;
-                let table = memory.table()?;
-                let mut config = wanted.config(table.contents());
-                config.verify = verify;
-                config.false_alarm = config.false_alarm.or(memory.false_alarm);
-                let mut same = false;
-                // awaited where it lies: moving it would take its size of the stack, twice
-                let done = {
-                    let tell = |event| {
-                        if let Event::Verified { now, .. } = &event {
-                            same = now.answer == Answer::Same;
-                        }
-                        events.tell(event);
-                    };
-                    pin!(identify(wanted, config, rig, table, plan, tell)).await
-                };
-                memory.keep_skin(&rig.state().skin).await;
-                let episode = done?;
-                if verify {
-                    events.go(same);
-                } else if wanted.learn {
-                    memory.learn_by_itself(&episode, events).await;
-                }
-                memory.episode = Some(episode);
-                Ok(())
-            }
-            Command::Label(name) => Ok(memory.label(name, events).await?),
-            Command::Train(wanted) => {
-                memory.episode = None;
-                rig.begin(wanted.seed).await;
-                let (store, base, buffer) = memory.lend()?;
-                let tell = |event| events.tell(event);
-                let done = train(wanted, rig, store, base, plan, buffer, tell).await;
-                memory.reload(events).await;
-                memory.keep_skin(&rig.state().skin).await;
-                done
-            }
-            Command::Rename { from, to } => {
-                let (store, base, buffer) = memory.lend()?;
-                let done = teach::rename(from, to, &base, store, buffer).await;
-                memory.reload(events).await;
-                Ok(done?)
-            }
-            Command::Forget(what) => {
-                let (store, base, buffer) = memory.lend()?;
-                let done = teach::delete(what, &base, store, buffer).await;
-                memory.reload(events).await;
-                Ok(done?)
+                rig.home().await.map_err(Failure::Rig)?;
             }
             Command::Calibrate => {
                 memory.episode = None;
                 let calibration = rig.calibrate().await?;
                 events.tell(told(&calibration));
-                Ok(calibrate::keep(memory.store()?, &calibration).await?)
+                calibrate::keep(memory.store()?, &calibration).await?;
             }
             Command::WriteCalibration(bytes) => {
                 if bytes.len() != RigCalibration::BYTES {
@@ -213,61 +274,25 @@ where
                 rig.set_calibration(calibration)
                     .await
                     .map_err(Failure::Rig)?;
-                Ok(calibrate::keep(memory.store()?, &calibration).await?)
-            }
-            Command::ReadTable(offset) => {
-                let part = transfer::read(memory.in_force(), *offset);
-                events.tell(part.ok_or(Failure::NoSuchByte)?);
-                Ok(())
-            }
-            Command::BeginTable(length) => {
-                Ok(memory.store()?.begin_table(*length as usize).await?)
-            }
-            Command::WriteTable { offset, bytes } => {
-                Ok(transfer::write(memory.store()?, *offset, bytes).await?)
-            }
-            Command::CommitTable => {
-                let done = memory.commit().await;
-                memory.reload(events).await;
-                Ok(done?)
-            }
-            Command::FactoryTable => {
-                let done = memory.store()?.factory_table().await;
-                memory.reload(events).await;
-                Ok(done?)
+                calibrate::keep(memory.store()?, &calibration).await?;
             }
             Command::Weigh(mn) => {
                 memory.episode = None;
                 let counts = rig.weigh(*mn).await?;
                 events.tell(Event::Weighed { mn: *mn, counts });
-                Ok(())
             }
             Command::TurnOver => {
-                let Turned {
-                    g_counts,
-                    offset_counts,
-                } = rig.turn_over().await?;
+                let turned = rig.turn_over().await?;
                 memory.episode = None;
                 events.tell(Event::Turned {
-                    g_counts,
-                    offset_counts,
+                    g_counts: turned.g_counts,
+                    offset_counts: turned.offset_counts,
                 });
-                Ok(())
             }
-            Command::SetFalseAlarm(share) => {
-                if !share.is_none_or(is_false_alarm) {
-                    return Err(Failure::FalseAlarm);
-                }
-                memory.store()?.set_false_alarm(*share).await?;
-                memory.reload(events).await;
-                Ok(())
-            }
-            Command::SetHighForce(allow) => rig.set_high_force(*allow, memory.store()).await,
-            // answered when they came, see `receive`
-            Command::Status | Command::Stop | Command::Stream(_) | Command::ReadCalibration => {
-                Ok(())
-            }
-            Command::Arm(_) => Ok(()),
+            Command::SetHighForce(allow) => rig.set_high_force(*allow, memory.store()).await?,
+            // answered when it came, see `receive`
+            _ => {}
         }
+        Ok(())
     }
 }

@@ -27,8 +27,7 @@ impl Random {
         self.0
     }
 
-    /// The next number from 0 to 1, without 1.
-    pub fn next_f32(&mut self) -> f32 {
+    pub(crate) fn next_f32(&mut self) -> f32 {
         (self.next_u32() >> 8) as f32 / (1 << 24) as f32
     }
 }
@@ -83,12 +82,9 @@ impl From<ExploreError<RigError>> for Failure {
     }
 }
 
-/// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another movement
-/// is chosen; only a rig that cannot go on ends it, with what is known so far. `random` serves
+/// Explores from the beginning until there is an answer. A slide that comes to nothing is made again, then another
+/// movement is chosen; only a rig that cannot go on ends it, with what is known so far. `random` serves
 /// [`crate::explorer::Strategy::Random`]; `tell` receives every step.
-///
-/// # Errors
-/// See [`ExploreError`].
 pub async fn explore<R: Rig, const N: usize>(
     rig: &mut R,
     explorer: &mut Explorer<'_, N>,

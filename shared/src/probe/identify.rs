@@ -1,22 +1,33 @@
-//! What a host asks a probe for, from beginning to end: an exploration. Every step of it is told in the words of
-//! [`crate::wire`], so that the host can follow each decision.
+//! An exploration that a host asks for, from beginning to end: every step is told in the words of [`crate::wire`], so
+//! that the host can follow each decision.
 
 use heapless::Vec;
 
 use super::explore::{ExplorationStep, Random, explore};
 use crate::dsp::Plan;
-use crate::explorer::{self, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError};
+use crate::explorer::{
+    self, Answer, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, LEADING,
+};
 use crate::rig::{Rig, RigError};
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
 
-/// Explores what lies under the finger until there is an answer, and reports it; the error is why there is none. `config` is
-/// that of the request, with what the probe adds to it; where it is to [verify](Config::verify), [`Event::Verified`] takes
-/// the verdict's place.
-///
-/// # Errors
-/// The request makes no sense with this table, or the exploration failed: see [`crate::probe::explore::ExploreError`].
+/// The result of an exploration.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Identification {
+    /// The most probable textures and their probabilities, the first one leading.
+    pub leading: Vec<(u16, f32), LEADING>,
+    /// The verdict.
+    pub verdict: explorer::Verdict,
+    /// Where the question was whether it is one texture: the answer.
+    pub answer: Option<Answer>,
+}
+
+/// Explores what lies under the finger until there is an answer, and reports it. `config` is that of the request, with
+/// what the probe adds to it; where it is to [verify](Config::verify), [`Event::Verified`] takes the verdict's place.
+/// Errors: the request makes no sense with this table, or the exploration failed: see
+/// [`crate::probe::explore::ExploreError`].
 pub async fn identify<R>(
     wanted: &Identify,
     config: Config,
@@ -24,11 +35,10 @@ pub async fn identify<R>(
     table: Table<'_>,
     plan: &Plan,
     mut tell: impl FnMut(Event),
-) -> Result<EpisodeSummary, Failure>
+) -> Result<(EpisodeSummary, Identification), Failure>
 where
     R: Rig<Error = RigError>,
 {
-    let contents = table.contents();
     if config.verify {
         if wanted.among.len() != 1 {
             return Err(Failure::Explorer(ExplorerError::Candidates));
@@ -43,61 +53,73 @@ where
         .consider(rig.measures(), config, candidates)
         .map_err(Failure::Explorer)?;
     let mut random = Random::new(wanted.seed);
+    let random = || random.next_u32();
     let mut slide: u8 = 1;
-    let verdict = explore(
-        rig,
-        &mut explorer,
-        plan,
-        || random.next_u32(),
-        |event| match event {
-            ExplorationStep::Chosen(action, expected) => {
-                if let Some(movement) = table.movement(action.movement) {
-                    tell(Event::Chosen {
-                        slide,
-                        movement,
-                        action,
-                        expected: best(expected),
-                    });
-                }
-            }
-            ExplorationStep::Early(ms) => tell(Event::Early(ms)),
-            ExplorationStep::Measured(action, measurement, posterior) => {
-                tell(Event::SlideReport {
-                    slide,
-                    action,
-                    observed: measurement.into(),
-                    posterior: Vec::from_slice(posterior).unwrap_or_default(),
-                });
-                slide = slide.saturating_add(1);
-            }
-            ExplorationStep::Verified(now, slides) => tell(Event::Verified { slides, now }),
-            // whether it is the one asked for was told after the slide
-            ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) if config.verify => {}
-            ExplorationStep::Rejected(_, why) => tell(Event::Rejected {
-                slide,
-                why: Failure::Slide(*why),
-            }),
-            ExplorationStep::Decided {
-                verdict,
-                slides,
-                certain,
-            } => {
-                let wants_label = matches!(contents, Contents::Fused(..)) && !certain;
-                tell(told(table, verdict, slides, wants_label));
-            }
-            // nothing is kept that a label could be for
-            ExplorationStep::CutShort(verdict, slides) => {
-                tell(told(table, verdict, slides, false));
-            }
-        },
-    )
-    .await?;
-    Ok(EpisodeSummary {
+    let step = |step: ExplorationStep<'_, RigError>| {
+        if let Some(event) = event(&step, table, &config, slide) {
+            tell(event);
+        }
+        if let ExplorationStep::Measured(..) = step {
+            slide = slide.saturating_add(1);
+        }
+    };
+    let verdict = explore(rig, &mut explorer, plan, random, step).await?;
+    let episode = EpisodeSummary {
         table: table.crc(),
         texture: verdict.texture,
         certain: explorer.is_certain(),
         observed: up_to(explorer.observed()),
         paces: up_to(explorer.paces()),
+    };
+    let verification = explorer.verification().filter(|_| config.verify);
+    let identification = Identification {
+        leading: explorer.leading(),
+        verdict,
+        answer: verification.map(|now| now.answer),
+    };
+    Ok((episode, identification))
+}
+
+/// The event of a step of the exploration, in which this slide is the next or has just been made.
+fn event(
+    step: &ExplorationStep<'_, RigError>,
+    table: Table<'_>,
+    config: &Config,
+    slide: u8,
+) -> Option<Event> {
+    Some(match *step {
+        ExplorationStep::Chosen(action, expected) => Event::Chosen {
+            slide,
+            movement: table.movement(action.movement)?,
+            action,
+            expected: best(expected),
+        },
+        ExplorationStep::Early(ms) => Event::Early(ms),
+        ExplorationStep::Measured(action, measurement, posterior) => Event::SlideReport {
+            slide,
+            action,
+            observed: measurement.into(),
+            posterior: Vec::from_slice(posterior).unwrap_or_default(),
+        },
+        ExplorationStep::Verified(now, slides) => Event::Verified { slides, now },
+        ExplorationStep::Rejected(_, why) => Event::Rejected {
+            slide,
+            why: Failure::Slide(*why),
+        },
+        // whether it is the one asked for was told after the slide
+        ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) if config.verify => {
+            return None;
+        }
+        ExplorationStep::Decided {
+            verdict,
+            slides,
+            certain,
+        } => {
+            let wants_label = matches!(table.contents(), Contents::Fused(..)) && !certain;
+            told(table, verdict, slides, wants_label)
+        }
+        // nothing is kept that a label could be for
+        ExplorationStep::CutShort(verdict, slides) => told(table, verdict, slides, false),
     })
 }
 
@@ -107,7 +129,6 @@ pub(crate) fn candidates(among: &[u16], textures: u16) -> impl Iterator<Item = u
     among.iter().copied().chain(all)
 }
 
-/// The event of a verdict.
 fn told(table: Table<'_>, verdict: &explorer::Verdict, slides: u8, wants_label: bool) -> Event {
     Event::Verdict(Verdict {
         texture: verdict.texture,

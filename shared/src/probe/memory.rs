@@ -11,24 +11,19 @@ use crate::store::{Store, StoreError};
 use crate::table::{Table, TableError};
 use crate::wire::{Event, Failure, MemoryError};
 
-/// What learning needs: the store, the table that it begins with, and the buffer for a new one.
-type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
+pub(super) type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
 
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
     /// Or why it could not be opened.
     store: Result<Store<F>, StoreError>,
     stored: B,
-    /// The table that comes with the firmware.
     factory: &'m [u8],
-    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A new
-    /// table is made here too; afterwards [`Memory::reload`] is due.
+    /// Begins with the table in force: the stored one or the factory's, with what the probe has learned by itself. A
+    /// new table is made here too; afterwards [`Memory::reload`] is due.
     buffer: &'m mut [u8],
-    /// Bytes of the table in force, or why there is none.
     length: Result<usize, MemoryError>,
-    /// No texture was learned and no table was written.
     is_factory: bool,
-    /// Why another table is in force than the one that was stored last.
     instead: Option<MemoryError>,
     /// Share of false alarms that limits are for; the table's own, unless set.
     pub false_alarm: Option<f32>,
@@ -131,9 +126,6 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     }
 
     /// The table in force.
-    ///
-    /// # Errors
-    /// There is none.
     pub fn table(&self) -> Result<Table<'_>, MemoryError> {
         match &self.length {
             Ok(_) => Ok(Table::read(self.in_force())?),
@@ -147,9 +139,6 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     }
 
     /// The store.
-    ///
-    /// # Errors
-    /// It could not be opened.
     pub fn store(&mut self) -> Result<&mut Store<F>, MemoryError> {
         self.store.as_mut().map_err(|why| MemoryError::Broken(*why))
     }
@@ -166,7 +155,6 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         Ok((store, base, self.buffer))
     }
 
-    /// Commits the table that was written to the store.
     pub(super) async fn commit(&mut self) -> Result<(), MemoryError> {
         let store = self
             .store
@@ -184,8 +172,8 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns from an exploration that the probe is certain of, and reports it. If that fails, the answer of the exploration
-    /// still stands.
+    /// Learns from an exploration that the probe is certain of, and reports it. If that fails, the answer of the
+    /// exploration still stands.
     pub(super) async fn learn_by_itself(
         &mut self,
         episode: &EpisodeSummary,
@@ -207,11 +195,9 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Learns the slides of the last exploration under the user's label, puts the new table in force and reports it. After
-    /// an error the exploration can be labelled again, with another name.
-    ///
-    /// # Errors
-    /// The rig has moved since the exploration; those of [`teach::label`].
+    /// Learns the slides of the last exploration under the user's label, puts the new table in force and reports it.
+    /// After an error the exploration can be labelled again, with another name. Errors: the rig has moved since the
+    /// exploration; those of [`teach::label`].
     pub async fn label(&mut self, name: &str, events: &mut impl Events) -> Result<(), MemoryError> {
         let episode = self.episode.take().ok_or(MemoryError::NoEpisode)?;
         let (store, base, buffer) = self.lend()?;

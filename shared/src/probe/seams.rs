@@ -33,27 +33,16 @@ pub trait RigHandle: Rig<Error = RigError> {
     async fn begin(&mut self, seed: u32);
 
     /// Ends a fault if there is one, then finds the limit switches, the lever's first.
-    ///
-    /// # Errors
-    /// The rig is not homed.
     async fn home(&mut self) -> Result<(), RigError>;
 
     /// Moves the stage without load from one end to the other, at this speed in um/s.
-    ///
-    /// # Errors
-    /// The run was refused, failed, or was stopped.
     async fn run_unloaded(&mut self, speed_um_s: u32) -> Result<UnloadedRun, RigError>;
 
     /// Uses this calibration from now on.
-    ///
-    /// # Errors
-    /// The rig refuses it.
     async fn set_calibration(&mut self, calibration: RigCalibration) -> Result<(), RigError>;
 
     /// Allows movements of up to 2 N, or forbids them. What the store cannot keep is not allowed.
-    ///
-    /// # Errors
-    /// [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
+    /// Errors: [`Failure::OtherProbe`]: a hand makes no such movement. The store failed.
     async fn set_high_force<F: NorFlash>(
         &mut self,
         _allow: bool,
@@ -68,31 +57,23 @@ pub trait RigHandle: Rig<Error = RigError> {
     /// Goes on from this wear of the skin.
     async fn set_skin(&mut self, skin: SkinCare);
 
-    /// Measures what a rig can measure of itself, and uses it from now on: with motors their current without load and P_DC in
-    /// the air, in a hand P_DC in the air.
-    ///
-    /// # Errors
-    /// It was not measured; the constants are those of before.
+    /// Measures what a rig can measure of itself, and uses it from now on: with motors their current without load and
+    /// P_DC in the air, in a hand P_DC in the air. Errors: it was not measured; the constants are those of before.
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure>;
 
-    /// Measures P_DC under a weight of so many mN that a person puts on the lifted finger, in counts above that in the air; below
-    /// 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
-    ///
-    /// # Errors
-    /// No such weight was put on the finger.
+    /// Measures P_DC under a weight of so many mN that a person puts on the lifted finger, in counts above that in the
+    /// air; below 0 where P_DC falls under it, as that of a load cell that is wired the wrong way round.
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure>;
 
     /// Measures gravity along the finger, which a person turns over.
-    ///
-    /// # Errors
-    /// Nobody turned it over. [`Failure::OtherProbe`]: it has no accelerometer.
+    /// Errors: nobody turned it over. [`Failure::OtherProbe`]: it has no accelerometer.
     async fn turn_over(&mut self) -> Result<Turned, Failure> {
         Err(Failure::OtherProbe)
     }
 }
 
-/// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable beside
-/// the store that they came from, for a new table is written while the old one is read.
+/// Where the bytes of the stored table are read: mapped flash on the chip, a copy on a PC. They must stay readable
+/// beside the store that they came from, for a new table is written while the old one is read.
 pub trait StoredBytes<F: NorFlash> {
     /// The bytes of [`Store::table`]; `None` if no table is stored, or if it cannot be read.
     fn bytes(&mut self, store: &mut Store<F>) -> Option<&[u8]>;

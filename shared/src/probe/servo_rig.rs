@@ -24,7 +24,8 @@ use crate::wire::{Event, Failure, MemoryError, Prompt};
 /// How often the samples are looked after, ms.
 pub const LOOK_MS: u32 = 10;
 const _: () = assert!(LOOK_MS * LOOKS_HZ == 1000);
-/// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight turns, too.
+/// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight
+/// turns, too.
 const TURNED_MN: u16 = 1000;
 /// A weight is waited for as long, looks.
 const PATIENCE: u32 = 60 * LOOKS_HZ;
@@ -56,9 +57,6 @@ pub enum RigCommand {
 
 impl RigCommand {
     /// Has the control do it.
-    ///
-    /// # Errors
-    /// The control refuses it.
     pub fn apply(self, control: &mut Control) -> Result<(), Refused> {
         match self {
             Self::Home => {
@@ -93,9 +91,6 @@ impl RigCommand {
 
 impl RigCommand {
     /// Has a rig do it that an arm moves.
-    ///
-    /// # Errors
-    /// The rig refuses it.
     pub fn apply_over_link(self, rig: &mut RigOverLink) -> Result<(), Refused> {
         match self {
             Self::Home | Self::Recover => {
@@ -164,7 +159,9 @@ impl Samples {
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Servo {
     /// Whether it has a stage of ours, whose motor's current is the shear; otherwise an arm moves the finger.
-    const HAS_STAGE: bool = true;
+    fn has_stage(&self) -> bool {
+        true
+    }
 
     /// Gives a command and waits for the answer. Samples from before the command are dropped.
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
@@ -203,14 +200,13 @@ pub trait Servo {
 }
 
 /// What a person is asked to do to a lifted finger, and what came of it so far.
-enum Asked {
+enum PersonTask {
     /// To lay a weight of so many mN on it: counts above the air. It is over when the weight was taken away again.
     Weight(u16, Weighing, Option<f32>),
-    /// To turn it over.
     Turn(Turning, Option<Turned>),
 }
 
-impl Asked {
+impl PersonTask {
     fn prompt(&self) -> Prompt {
         match self {
             Self::Weight(mn, weighing, None) if weighing.wants_weight() => Prompt::Weigh(*mn),
@@ -220,7 +216,6 @@ impl Asked {
         }
     }
 
-    /// Looks at the finger; whether it is over.
     fn look(&mut self, rig: &RigState, gravity: Option<f32>) -> bool {
         let counts = rig.force_mn / rig.calibration.pressure.force_mn_per_count;
         match self {
@@ -252,7 +247,6 @@ impl<S: Servo> ServoRig<S> {
         }
     }
 
-    /// Waits until the rig is at rest.
     async fn rest(&mut self) -> Result<RigState, RigError> {
         self.until(|rig| rig.at_rest, |_| ()).await
     }
@@ -282,16 +276,14 @@ impl<S: Servo> ServoRig<S> {
     }
 
     /// Lifts the finger to its limit switch; the stage stays where it is.
-    ///
-    /// # Errors
-    /// See [`RigError`].
     pub async fn lift(&mut self) -> Result<(), RigError> {
         self.command(RigCommand::Lift).await?;
         self.rest().await.map(|_| ())
     }
 
-    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is done.
-    async fn with_person(&mut self, mn: u16, asked: &mut Asked) -> Result<(), RigError> {
+    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is
+    /// done.
+    async fn with_person(&mut self, mn: u16, asked: &mut PersonTask) -> Result<(), RigError> {
         if self.rest().await?.phase == Phase::Parked {
             self.home().await?;
         }
@@ -374,7 +366,7 @@ impl<S: Servo> RigHandle for ServoRig<S> {
     }
 
     async fn calibrate(&mut self) -> Result<RigCalibration, Failure> {
-        if S::HAS_STAGE {
+        if self.servo.has_stage() {
             calibrate::by_motor(self).await
         } else {
             calibrate::in_air(self).await
@@ -388,11 +380,11 @@ impl<S: Servo> RigHandle for ServoRig<S> {
 
     async fn weigh(&mut self, mn: u16) -> Result<f32, Failure> {
         let scale = self.servo.state().calibration.pressure.force_mn_per_count;
-        let mut weight = Asked::Weight(mn, Weighing::new(mn, scale), None);
+        let mut weight = PersonTask::Weight(mn, Weighing::new(mn, scale), None);
         let done = self.with_person(mn, &mut weight).await;
         done.map_err(Failure::Rig)?;
         match weight {
-            Asked::Weight(_, _, Some(counts)) => Ok(counts),
+            PersonTask::Weight(_, _, Some(counts)) => Ok(counts),
             _ => Err(Failure::Rig(RigError::NobodyThere)),
         }
     }
@@ -401,11 +393,11 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         if self.servo.gravity().is_none() {
             return Err(Failure::OtherProbe);
         }
-        let mut turn = Asked::Turn(Turning::default(), None);
+        let mut turn = PersonTask::Turn(Turning::default(), None);
         let done = self.with_person(TURNED_MN, &mut turn).await;
         done.map_err(Failure::Rig)?;
         match turn {
-            Asked::Turn(_, Some(turned)) => Ok(turned),
+            PersonTask::Turn(_, Some(turned)) => Ok(turned),
             _ => Err(Failure::Rig(RigError::NobodyThere)),
         }
     }
@@ -438,7 +430,7 @@ impl<S: Servo> Rig for ServoRig<S> {
     type Error = RigError;
 
     fn measures(&self) -> PropertySet {
-        if S::HAS_STAGE {
+        if self.servo.has_stage() {
             PropertySet::ALL
         } else {
             PropertySet::WITHOUT_SHEAR

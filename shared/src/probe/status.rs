@@ -22,8 +22,7 @@ pub struct RigState {
     pub steps: i32,
     /// Where the stage stands, mm.
     pub stage_mm: f32,
-    /// How fast the stage moves, mm/s.
-    pub velocity_mm_s: f32,
+    pub(crate) velocity_mm_s: f32,
     /// Motor current, A.
     pub current_a: f32,
     /// Mean motor current of the last run at constant speed, A.

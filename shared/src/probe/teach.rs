@@ -1,9 +1,9 @@
-//! What a probe learns from its slides, by itself where it is certain and from the user's label where it is not; and how it
-//! deletes what it learned.
+//! What a probe learns from its slides, by itself where it is certain and from the user's label where it is not; and
+//! how it deletes what it learned.
 //!
-//! Two things are kept apart. The stored table holds what came with it and what the probe learned from the user; every such
-//! change writes the table anew. What the probe has learned by itself lies beside it in the settings, and replaces the
-//! table's own means in memory only ([`put_in_force`]); deleting it restores the table to the bit.
+//! Two things are kept apart. The stored table holds what came with it and what the probe learned from the user; every
+//! such change writes the table anew. What the probe has learned by itself lies beside it in the settings, and replaces
+//! the table's own means in memory only ([`put_in_force`]); deleting it restores the table to the bit.
 
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
@@ -19,9 +19,7 @@ use crate::wire::{Event, Forget, MemoryError, TextureLearned};
 
 /// Copies the stored table into `buffer`, with what the probe has learned by itself in its place: the table in force.
 /// Returns its length.
-///
-/// # Errors
-/// `buffer` is too small. What cannot be read of the settings is left out.
+/// Errors: `buffer` is too small. What cannot be read of the settings is left out.
 pub async fn put_in_force<F: NorFlash>(
     base: &Table<'_>,
     store: Option<&mut Store<F>>,
@@ -58,12 +56,10 @@ pub async fn put_in_force<F: NorFlash>(
     Ok(length)
 }
 
-/// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`. Returns the
-/// event to send; `None` where there is nothing to learn.
-///
-/// # Errors
-/// The store failed; the table in force is as it was.
-pub async fn learn_by_itself<F: NorFlash>(
+/// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`.
+/// Returns the event to send; `None` where there is nothing to learn. Errors: the store failed; the table in force is
+/// as it was.
+pub(crate) async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
     store: &mut Store<F>,
     buffer: &mut [u8],
@@ -114,8 +110,8 @@ pub async fn learn_by_itself<F: NorFlash>(
     })))
 }
 
-/// What was observed in an episode, as it is learned if the texture is this one of the table, or a new one: at the movement's
-/// speed.
+/// What was observed in an episode, as it is learned if the texture is this one of the table, or a new one: at the
+/// movement's speed.
 fn observed<'a>(
     episode: &'a EpisodeSummary,
     table: &'a Table<'_>,
@@ -145,19 +141,16 @@ fn place(
     record.movements.get_mut(at)
 }
 
-/// Takes in so many slides of this mean.
 fn adapt(known: &mut Whitened, slides: u8, mean: &Vector) {
     for _ in 0..slides {
         known.adapt(mean);
     }
 }
 
-/// Learns from the user's word what lay under the finger in the last exploration: a texture of the table, or a new one. The
-/// store has a new table then. `base` is the stored table, `in_force` the one that was explored with; `buffer` takes the new
-/// one, and is to be put in force anew.
-///
-/// # Errors
-/// There is nothing to learn from, the table is full, or the store failed.
+/// Learns from the user's word what lay under the finger in the last exploration: a texture of the table, or a new one.
+/// The store has a new table then. `base` is the stored table, `in_force` the one that was explored with; `buffer`
+/// takes the new one, and is to be put in force anew. Errors: there is nothing to learn from, the table is full, or the
+/// store failed.
 pub async fn label<F: NorFlash>(
     episode: &EpisodeSummary,
     name: &str,
@@ -243,7 +236,6 @@ pub(crate) async fn delete_stale<F: NorFlash>(
     store.delete_self_learned(of).await
 }
 
-/// Stores the table with one change.
 async fn change<F: NorFlash>(
     change: Change<'_>,
     base: &Table<'_>,
@@ -258,9 +250,7 @@ async fn change<F: NorFlash>(
 }
 
 /// Gives a texture of the stored table another name.
-///
-/// # Errors
-/// There is no such texture, the name is another's, or the store failed.
+/// Errors: there is no such texture, the name is another's, or the store failed.
 pub async fn rename<F: NorFlash>(
     from: &str,
     to: &str,
@@ -278,9 +268,7 @@ pub async fn rename<F: NorFlash>(
 }
 
 /// Deletes a texture from the stored table, what the probe learned by itself, or an unfinished training.
-///
-/// # Errors
-/// There is no such texture, it is the last one, or the store failed.
+/// Errors: there is no such texture, it is the last one, or the store failed.
 pub async fn delete<F: NorFlash>(
     what: &Forget,
     base: &Table<'_>,
@@ -305,7 +293,6 @@ pub async fn delete<F: NorFlash>(
     Ok(())
 }
 
-/// A name as the probe has it; one that is longer than any is none.
 fn name_of(name: &str) -> Name {
     Name::try_from(name).unwrap_or_default()
 }

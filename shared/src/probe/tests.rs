@@ -142,7 +142,8 @@ fn random_numbers_are_spread() {
     }
 }
 
-/// Four textures whose tractions lie ten standard deviations apart; the third one's bands are those of the script's slides.
+/// Four textures whose tractions lie ten standard deviations apart; the third one's bands are those of the script's
+/// slides.
 fn fused_table() -> vec::Vec<u8> {
     let bands = {
         let plan = Plan::new();
@@ -174,7 +175,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
             open,
             ..wanted(&[])
         };
-        let episode = block_on(identify(
+        let (episode, found) = block_on(identify(
             &wanted,
             wanted.config(Table::read(&bytes).unwrap().contents()),
             &mut Script(slides.iter().copied().collect()),
@@ -183,6 +184,8 @@ fn a_fused_exploration_says_whether_it_is_certain() {
             |tell| told.push(tell),
         ))
         .unwrap();
+        let leading = found.leading.first().map(|(texture, _)| *texture);
+        assert_eq!(leading, Some(found.verdict.texture));
         (episode, told.pop().unwrap())
     };
     let (episode, verdict) = explored(&[Some(10_000)], true);
@@ -270,10 +273,8 @@ fn training_a_fused_texture_ends_in_the_store() {
         block_on(train(
             &wanted,
             &mut rig,
-            &mut store,
-            table,
+            (&mut store, table, &mut buffer),
             &Plan::new(),
-            &mut buffer,
             |tell| told.push(tell),
         ))
         .unwrap();

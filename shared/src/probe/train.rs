@@ -3,30 +3,26 @@
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
+use super::memory::Lent;
 use super::teach::delete_stale;
 use super::training::{Training, Wanted};
 use crate::dsp::Plan;
-use crate::features::{Movement, Observation, Slide};
+use crate::features::{Measurement, Movement, Observation, Slide};
 use crate::rig::{MAX_REJECTED, Refused, Rig, RigError};
-use crate::store::Store;
+use crate::store::{Store, TrainingRecord};
 use crate::table::{MAX_MOVEMENTS, Table};
 use crate::up_to;
 use crate::wire::{Event, Failure, Rejection, Train};
 
-/// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every trial
-/// is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a whole table.
-///
-/// # Errors
-/// The texture cannot be learned, see [`crate::wire::TrainingError`]; the rig does not press as hard as one of the movements;
-/// the rig or the store failed;
-/// [`MAX_REJECTED`] slides in a row were no good.
+/// Learns the texture under the finger on top of `table`, and goes on where an earlier training of it stopped: every
+/// trial is stored at once. In the end the store has a new table, which is to be used from then on. `buffer` holds a
+/// whole table. Errors: the texture cannot be learned, see [`crate::wire::TrainingError`]; the rig does not press as
+/// hard as one of the movements; the rig or the store failed; [`MAX_REJECTED`] slides in a row were no good.
 pub async fn train<R, F>(
     wanted: &Train,
     rig: &mut R,
-    store: &mut Store<F>,
-    table: Table<'_>,
+    (store, table, buffer): Lent<'_, F>,
     plan: &Plan,
-    buffer: &mut [u8],
     mut tell: impl FnMut(Event),
 ) -> Result<(), Failure>
 where
@@ -68,14 +64,7 @@ where
         let measured = match made {
             Err(why) if !rig.recover(&why).await => return Err(Failure::Rig(why)),
             Err(why) => Err(Rejection::Rig(why)),
-            Ok(()) => slide
-                .finish()
-                .map_err(Rejection::Slide)
-                .and_then(|measurement| {
-                    let observed = Observation::from(&measurement);
-                    let took = training.took(Some(&table), movement, &observed);
-                    Ok((took.map_err(Rejection::Training)?, measurement))
-                }),
+            Ok(()) => take(&mut training, &table, slide),
         };
         match measured {
             Ok((training_record, measurement)) => {
@@ -101,19 +90,40 @@ where
         }
     }
     if training.makes_table() {
-        let new = training.encode(Some(&table), buffer)?;
-        let number = new.find(name).map(|texture| new.number(texture));
-        let (length, lineage) = (new.as_bytes().len(), new.lineage());
-        if table.find(name).is_none() {
-            delete_stale(&table, store).await?;
-        }
-        store.replace_table(buffer, length).await?;
-        if let Some(number) = number {
-            // the user's training replaces what the probe had learned by itself
-            store.delete_self_learned(Some((lineage, number))).await?;
-        }
-        // what the table holds now need not be kept beside it
-        store.delete_training_records(name).await?;
+        keep(&training, (store, table, buffer)).await?;
     }
     Ok(())
+}
+
+async fn keep<F: NorFlash>(
+    training: &Training,
+    (store, table, buffer): Lent<'_, F>,
+) -> Result<(), Failure> {
+    let new = training.encode(Some(&table), buffer)?;
+    let number = new.find(training.name()).map(|texture| new.number(texture));
+    let (length, lineage) = (new.as_bytes().len(), new.lineage());
+    if table.find(training.name()).is_none() {
+        delete_stale(&table, store).await?;
+    }
+    store.replace_table(buffer, length).await?;
+    if let Some(number) = number {
+        // the user's training replaces what the probe had learned by itself
+        store.delete_self_learned(Some((lineage, number))).await?;
+    }
+    // what the table holds now need not be kept beside it
+    store.delete_training_records(training.name()).await?;
+    Ok(())
+}
+
+fn take(
+    training: &mut Training,
+    table: &Table<'_>,
+    slide: Slide<'_>,
+) -> Result<(TrainingRecord, Measurement), Rejection> {
+    let movement = slide.movement();
+    let measurement = slide.finish().map_err(Rejection::Slide)?;
+    let record = training
+        .took(Some(table), movement, &Observation::from(&measurement))
+        .map_err(Rejection::Training)?;
+    Ok((record, measurement))
 }

@@ -1,15 +1,15 @@
 //! Learning a texture by touching it: which movement comes next, what its slide adds, and the table in the end.
 //!
-//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide; a
-//! training begun anew with the same name and table goes on where it stood when it is given them back:
+//! A [`Training`] touches nothing itself. Every [`TrainingRecord`] that it gives is to be stored before the next slide;
+//! a training begun anew with the same name and table goes on where it stood when it is given them back:
 //!
 //! ```text
 //! new -> resume per stored movement -> [ next -> slide -> took -> store ]* -> encode -> commit the table -> delete
 //! ```
 //!
-//! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has, so
-//! what it learns does not go into that table: its result is stored and reported. It makes a table only where there is none,
-//! with the pilot's movements, or where the table has these already.
+//! A pilot (the paper's "Identifying the most useful exploratory movements") makes other movements than the table has,
+//! so what it learns does not go into that table: its result is stored and reported. It makes a table only where there
+//! is none, with the pilot's movements, or where the table has these already.
 
 use crate::table::TrainingStats;
 use heapless::Vec;
@@ -24,7 +24,7 @@ use crate::table::{
 use crate::wire::{LEAST_TRIALS, TrainingError};
 
 /// The movements of a table that is begun: the three that the paper chose.
-pub const FIRST_MOVEMENTS: [Movement; 3] = [
+pub(crate) const FIRST_MOVEMENTS: [Movement; 3] = [
     Movement::FOR_TRACTION,
     Movement::FOR_FINENESS,
     Movement::FOR_ROUGHNESS,
@@ -50,18 +50,40 @@ pub struct Wanted<'n> {
     pub most_mn: u16,
 }
 
+/// Returns an error if what is wanted cannot be learned into such a table.
+fn check(contents: Contents, wanted: &Wanted<'_>) -> Result<(), TrainingError> {
+    match contents {
+        Contents::Gaussians(measured) => {
+            if wanted.trials < LEAST_TRIALS {
+                return Err(TrainingError::Trials(wanted.trials));
+            }
+            if measured.is_empty() {
+                return Err(TrainingError::Measures(None));
+            }
+            if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
+                return Err(TrainingError::Measures(Some(missing)));
+            }
+        }
+        Contents::Fused(set, _) => {
+            if wanted.trials == 0 {
+                return Err(TrainingError::Trials(0));
+            }
+            if !set.measured_by(wanted.measures) {
+                return Err(TrainingError::Features(set));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// A texture that is being learned.
 #[derive(Clone, Debug)]
 pub struct Training {
     name: Name,
     trials: u8,
-    /// What its table knows of a texture.
     contents: Contents,
-    /// Checksum of the table that there was at the beginning.
     table: Option<u32>,
-    /// Whether trials of that table are counted in.
     goes_on: bool,
-    /// Whether a table can be made of it.
     makes_table: bool,
     learned: Vec<(Movement, TrainingStats), MAX_MOVEMENTS>,
 }
@@ -70,9 +92,7 @@ impl Training {
     /// Begins a training, or begins it again; `table` is the one in use, `buffer` the bytes that a table may have.
     ///
     /// Without a table its movements are [`FIRST_MOVEMENTS`], or the pilot's.
-    ///
-    /// # Errors
-    /// Everything that would keep the texture out of the table in the end: see [`TrainingError`].
+    /// Errors: everything that would keep the texture out of the table in the end: see [`TrainingError`].
     #[inline]
     pub fn new(
         wanted: Wanted<'_>,
@@ -94,27 +114,7 @@ impl Training {
             Some(table) if !table.measured().is_empty() => table.contents(),
             _ => Contents::Gaussians(wanted.measures),
         };
-        match contents {
-            Contents::Gaussians(measured) => {
-                if wanted.trials < LEAST_TRIALS {
-                    return Err(TrainingError::Trials(wanted.trials));
-                }
-                if measured.is_empty() {
-                    return Err(TrainingError::Measures(None));
-                }
-                if let Some(missing) = measured.iter().find(|p| !wanted.measures.contains(*p)) {
-                    return Err(TrainingError::Measures(Some(missing)));
-                }
-            }
-            Contents::Fused(set, _) => {
-                if wanted.trials == 0 {
-                    return Err(TrainingError::Trials(0));
-                }
-                if !set.measured_by(wanted.measures) {
-                    return Err(TrainingError::Features(set));
-                }
-            }
-        }
+        check(contents, &wanted)?;
         let untouched = match contents {
             Contents::Gaussians(_) => TrainingStats::Gaussians(Experience::default()),
             Contents::Fused(..) => TrainingStats::Fused(Whitened::default()),
@@ -173,14 +173,14 @@ impl Training {
         &self.name
     }
 
-    /// The checksum under which progress is stored: of the table whose trials of this texture are counted in, `None` where
-    /// there are none.
+    /// The checksum under which progress is stored: of the table whose trials of this texture are counted in, `None`
+    /// where there are none.
     pub fn table(&self) -> Option<u32> {
         self.table.filter(|_| self.goes_on)
     }
 
     /// Whether there is to be a table in the end; a pilot beside another table has only a result.
-    pub fn makes_table(&self) -> bool {
+    pub(crate) fn makes_table(&self) -> bool {
         self.makes_table
     }
 
@@ -190,9 +190,7 @@ impl Training {
     }
 
     /// Takes up what was stored of this training at a movement.
-    ///
-    /// # Errors
-    /// [`TrainingError::Movement`], [`TrainingError::Stats`].
+    /// Errors: [`TrainingError::Movement`], [`TrainingError::Stats`].
     #[inline]
     pub fn resume(
         &mut self,
@@ -212,8 +210,8 @@ impl Training {
         Ok(())
     }
 
-    /// The movement to be made next: the one made least often, of several the first; `None` when there are enough trials of
-    /// all.
+    /// The movement to be made next: the one made least often, of several the first; `None` when there are enough
+    /// trials of all.
     pub fn next(&self) -> Option<Movement> {
         let (movement, experience) = self.learned.iter().min_by_key(|(_, e)| e.trials())?;
         (experience.trials() < self.trials).then_some(*movement)
@@ -227,9 +225,7 @@ impl Training {
             .sum()
     }
 
-    /// Takes a slide in, and gives what is to be stored. `table` is the one that the training was begun with.
-    ///
-    /// # Errors
+    /// Takes a slide in, and gives what is to be stored. `table` is the one that the training was begun with. Errors:
     /// [`TrainingError::Movement`], [`TrainingError::Missing`], [`TrainingError::Features`]: the slide does not count.
     #[inline]
     pub fn took(
@@ -266,11 +262,9 @@ impl Training {
         })
     }
 
-    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other textures
-    /// as they are to the bit, or one of this texture alone.
-    ///
-    /// # Errors
-    /// [`TrainingError::Unfinished`], [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
+    /// Writes the table with this texture into the beginning of `buffer`: `table`, the one in use, with all other
+    /// textures as they are to the bit, or one of this texture alone. Errors: [`TrainingError::Unfinished`],
+    /// [`TrainingError::Pilot`], [`TrainingError::Table`], [`TrainingError::Encode`].
     #[inline]
     pub fn encode<'r>(
         &self,

@@ -10,7 +10,7 @@ pub const ARM_SAYS_MS: u32 = 100;
 ///
 /// The guard sees the force within 10 ms, its order takes up to 50 ms to the arm, which stands 50 ms later: by then it
 /// has come down 0.11 mm farther.
-pub const APPROACH_UM_S: u32 = 1000;
+pub(crate) const APPROACH_UM_S: u32 = 1000;
 
 /// One task for the arm. A new order replaces the one before it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -80,7 +80,6 @@ pub enum ArmState {
     Failed,
 }
 
-/// The open order, and the time of the last message about it.
 #[derive(Clone, Debug)]
 pub(super) struct Orders {
     order: ArmOrder,
@@ -105,7 +104,6 @@ impl Orders {
         }
     }
 
-    /// Gives the next order.
     pub(super) fn give(&mut self, task: ArmTask) {
         *self = Self {
             order: ArmOrder {
@@ -130,7 +128,6 @@ impl Orders {
         Some(report.state)
     }
 
-    /// Ends the repeating of the order.
     pub(super) fn close(&mut self) {
         self.said_ms = None;
     }

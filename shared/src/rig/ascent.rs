@@ -28,7 +28,6 @@ pub(super) fn is_far(finger: &FingerModel, counts: Option<f32>, air: f32) -> boo
     counts.is_some_and(|counts| libm::fabsf(counts - air) > finger.counts(AIR_MN))
 }
 
-/// P_DC on the way to the limit switch.
 #[derive(Clone, Debug)]
 pub(super) struct Ascent {
     finger: &'static FingerModel,
@@ -45,7 +44,6 @@ pub(super) struct Ascent {
 }
 
 impl Ascent {
-    /// A state for such a finger, without any knowledge of its P_DC.
     pub(super) fn new(finger: &'static FingerModel) -> Self {
         Self {
             finger,
@@ -57,7 +55,6 @@ impl Ascent {
         }
     }
 
-    /// Forgets P_DC: the finger or its calibration is another.
     pub(super) fn forget(&mut self) {
         (self.lowest, self.pressed) = (None, false);
     }
@@ -169,12 +166,10 @@ impl Ascent {
         }
     }
 
-    /// Takes P_DC without contact, counts.
     pub(super) fn zero(&mut self, counts: f32) {
         self.lowest = Some(counts);
     }
 
-    /// The least P_DC so far, counts.
     pub(super) fn lowest(&self) -> Option<f32> {
         self.lowest
     }

@@ -19,7 +19,7 @@ use crate::features::Movement;
 use crate::sensor::{FingerModel, pressure::Channel};
 
 /// Time over which the still finger is measured, ms.
-pub const BACKGROUND_MS: u32 = 1000;
+pub(crate) const BACKGROUND_MS: u32 = 1000;
 /// Speed of the stage while the finger is lifted.
 const RETURN_MM_S: f32 = 50.0;
 /// The hard stop is nearer than this to where the limit switch opens, mm: it is 4 mm before it.
@@ -53,15 +53,12 @@ pub struct Control {
     compared: bool,
     /// P_DC without contact before the fault that the rig recovers from by itself: it must be found again.
     recovered: Option<f32>,
-    /// P_DC in the air, mean of the last run without load.
     air: Option<f32>,
-    /// The way up, by P_DC.
     ascent: Ascent,
     /// P_DC above no contact of the still finger, mean of the background.
     still: f32,
     lever_top: Switch,
     stage_left: Switch,
-    /// Duty of the last tick.
     duty: f32,
 }
 
@@ -118,8 +115,7 @@ impl Control {
         self.stage.position_mm()
     }
 
-    /// Speed of the stage by its encoder, mm/s.
-    pub fn stage_velocity_mm_s(&self) -> f32 {
+    pub(crate) fn stage_velocity_mm_s(&self) -> f32 {
         self.stage.velocity_mm_s()
     }
 
@@ -134,9 +130,7 @@ impl Control {
     }
 
     /// Takes other constants, between movements.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
+    /// Errors: [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
         if self.phase != Phase::Ready && !self.is_at_rest() {
             return Err(Refused::Busy);
@@ -167,9 +161,6 @@ impl Control {
     }
 
     /// Looks for the limit switches, the lever's first.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     #[inline]
     pub fn home(&mut self) -> Result<(), Refused> {
         match self.phase {
@@ -197,9 +188,6 @@ impl Control {
 
     /// Ends a fault and homes without a person. P_DC in the air must be within 40 counts of its value before: a finger
     /// that has drifted further, and would drift on, is [`Fault::LeverNotHome`].
-    ///
-    /// # Errors
-    /// As [`Control::reset`] and [`Control::home`].
     #[inline]
     pub fn recover(&mut self) -> Result<(), Refused> {
         let before = self.zeroed.then(|| self.meter.no_contact());
@@ -232,9 +220,6 @@ impl Control {
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the length that the sample leaves.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     #[inline]
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
@@ -296,9 +281,7 @@ impl Control {
     }
 
     /// Ends a fault. Lever and stage have to be homed again.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`] while the finger is still being lifted.
+    /// Errors: [`Refused::Busy`] while the finger is still being lifted.
     #[inline]
     pub fn reset(&mut self) -> Result<(), Refused> {
         if let Phase::Faulted(fault) = self.phase {
@@ -468,40 +451,8 @@ impl Control {
             Phase::Parked | Phase::Faulted(_) => {}
             Phase::Ready if self.lever.wait() => self.ascent.set_out(self.meter.mean()),
             Phase::Ready => {}
-            Phase::Homing => {
-                if self.lever.is_lifted() {
-                    match self.stage.state() {
-                        // a switch with a broken wire is closed everywhere: do not drag the finger along
-                        StageState::Unknown => {
-                            let mean = self.meter.mean();
-                            if self.is_pressed(mean) {
-                                self.check(Fault::LeverNotHome);
-                            }
-                            // before there are 10 ms of P_DC nothing is known; the guard sees to it that they come
-                            let known = mean.is_some() || !self.calibration.air_known;
-                            if known && self.phase == Phase::Homing {
-                                self.stage.home();
-                            }
-                        }
-                        StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
-                            self.stage.go(MARGIN_MM, RETURN_MM_S);
-                        }
-                        // it stood beyond the switch, towards its hard stop: the origin is where the switch opens
-                        StageState::Standing
-                            if self.stage.is_searched() && inputs.stage_limits.0 =>
-                        {
-                            let to = self.stage.position_mm() + MARGIN_MM;
-                            if to > BEYOND_MM {
-                                self.check(Fault::StageNotHome);
-                            }
-                            self.stage.go(to, RETURN_MM_S);
-                        }
-                        StageState::Standing if self.stage.is_searched() => self.stage.home(),
-                        StageState::Standing => self.enter(Phase::Ready),
-                        _ => {}
-                    }
-                }
-            }
+            Phase::Homing if self.lever.is_lifted() => self.home_stage(inputs),
+            Phase::Homing => {}
             Phase::Positioning => {
                 if self.stage.state() == StageState::Standing && !self.lever.is_parking() {
                     let target = f32::from(self.run.movement().force_mn())
@@ -541,31 +492,7 @@ impl Control {
                     self.enter(Phase::Sliding);
                 }
             }
-            Phase::Sliding => {
-                let speed_mm_s = self.run.movement().speed_mm_s();
-                let shear_n = self.calibration.shear_n(inputs.current_a, speed_mm_s);
-                self.run.slid(self.ms, shear_n, inputs, outputs);
-                self.skin
-                    .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
-                if self.stage.state() == StageState::Standing {
-                    let felt = self.meter.long_counts().unwrap_or_default();
-                    let (mn, share) = SLIDE_OFF;
-                    let most = self.finger.counts(mn) + share * self.still;
-                    if libm::fabsf(felt - self.still) > most {
-                        self.check(Fault::Unsteady);
-                    }
-                }
-                if self.phase == Phase::Sliding && self.stage.state() == StageState::Standing {
-                    let ended = self.run.ended(self.ms);
-                    self.ended = Some(if self.guard.looks_for(Fault::SlideGap) {
-                        ended
-                    } else {
-                        Ended::Whole
-                    });
-                    self.lever.lift(inputs.steps);
-                    self.enter(Phase::Lifting);
-                }
-            }
+            Phase::Sliding => self.advance_slide(inputs, outputs),
             Phase::Unloaded => {
                 self.run.weigh_current(self.ms, inputs);
                 if self.stage.state() == StageState::Standing {
@@ -587,6 +514,66 @@ impl Control {
                     }
                 }
             }
+        }
+    }
+
+    /// The way of the stage to its switch and off it, once the finger is lifted.
+    #[inline]
+    fn home_stage(&mut self, inputs: &Inputs) {
+        match self.stage.state() {
+            // a switch with a broken wire is closed everywhere: do not drag the finger along
+            StageState::Unknown => {
+                let mean = self.meter.mean();
+                if self.is_pressed(mean) {
+                    self.check(Fault::LeverNotHome);
+                }
+                // before there are 10 ms of P_DC nothing is known; the guard sees to it that they come
+                let known = mean.is_some() || !self.calibration.air_known;
+                if known && self.phase == Phase::Homing {
+                    self.stage.home();
+                }
+            }
+            StageState::Standing if self.stage.position_mm() < MARGIN_MM / 2.0 => {
+                self.stage.go(MARGIN_MM, RETURN_MM_S);
+            }
+            // it stood beyond the switch, towards its hard stop: the origin is where the switch opens
+            StageState::Standing if self.stage.is_searched() && inputs.stage_limits.0 => {
+                let to = self.stage.position_mm() + MARGIN_MM;
+                if to > BEYOND_MM {
+                    self.check(Fault::StageNotHome);
+                }
+                self.stage.go(to, RETURN_MM_S);
+            }
+            StageState::Standing if self.stage.is_searched() => self.stage.home(),
+            StageState::Standing => self.enter(Phase::Ready),
+            _ => {}
+        }
+    }
+
+    #[inline]
+    fn advance_slide(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
+        let speed_mm_s = self.run.movement().speed_mm_s();
+        let shear_n = self.calibration.shear_n(inputs.current_a, speed_mm_s);
+        self.run.slid(self.ms, shear_n, inputs, outputs);
+        self.skin
+            .slid(shear_n, self.force_mn() * 1e-3, self.stage.velocity_mm_s());
+        if self.stage.state() == StageState::Standing {
+            let felt = self.meter.long_counts().unwrap_or_default();
+            let (mn, share) = SLIDE_OFF;
+            let most = self.finger.counts(mn) + share * self.still;
+            if libm::fabsf(felt - self.still) > most {
+                self.check(Fault::Unsteady);
+            }
+        }
+        if self.phase == Phase::Sliding && self.stage.state() == StageState::Standing {
+            let ended = self.run.ended(self.ms);
+            self.ended = Some(if self.guard.looks_for(Fault::SlideGap) {
+                ended
+            } else {
+                Ended::Whole
+            });
+            self.lever.lift(inputs.steps);
+            self.enter(Phase::Lifting);
         }
     }
 }

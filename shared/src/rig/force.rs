@@ -2,17 +2,15 @@
 
 use crate::sensor::pressure::{Calibration, Counts, RATE_HZ};
 
-/// Samples of P_DC in a mean: 10 ms.
-pub const MEAN_SAMPLES: usize = 22;
+pub(crate) const MEAN_SAMPLES: usize = 22;
 const KEPT: usize = 2 * MEAN_SAMPLES;
 /// A mean over [`MEAN_SAMPLES`] shows the force of half its length ago, (n - 1)/2 samples.
 const LAG_SAMPLES: f32 = (MEAN_SAMPLES - 1) as f32 / 2.0;
 
 /// The last 20 ms of P_DC, and the value that means no contact.
 #[derive(Clone, Debug)]
-pub struct ForceMeter {
+pub(crate) struct ForceMeter {
     samples: [u16; KEPT],
-    /// Index of the next sample.
     next: usize,
     filled: usize,
     /// Sums of the newer and of the older half.
@@ -25,7 +23,7 @@ pub struct ForceMeter {
 
 impl ForceMeter {
     /// An empty meter; `no_contact` counts mean no force.
-    pub fn new(no_contact: f32) -> Self {
+    pub(crate) fn new(no_contact: f32) -> Self {
         Self {
             samples: [0; KEPT],
             next: 0,
@@ -37,8 +35,7 @@ impl ForceMeter {
         }
     }
 
-    /// Takes one sample of P_DC.
-    pub fn push(&mut self, counts: Counts) {
+    pub(crate) fn push(&mut self, counts: Counts) {
         let counts = counts.get();
         // the core divides in 12 cycles
         let middle = if self.next < MEAN_SAMPLES {
@@ -66,18 +63,17 @@ impl ForceMeter {
         self.long.1 = self.long.1.saturating_add(1);
     }
 
-    /// Returns true if a mean and its slope are known.
     fn is_full(&self) -> bool {
         self.filled >= KEPT
     }
 
     /// P_DC counts above no contact, mean over the last 10 ms; 0 before there are 10 ms of samples.
-    pub fn counts(&self) -> f32 {
+    pub(crate) fn counts(&self) -> f32 {
         self.mean().map_or(0.0, |mean| mean - self.no_contact)
     }
 
     /// Change of that mean per second.
-    pub fn counts_per_s(&self) -> f32 {
+    pub(crate) fn counts_per_s(&self) -> f32 {
         if !self.is_full() {
             return 0.0;
         }
@@ -86,59 +82,54 @@ impl ForceMeter {
         difference / MEAN_SAMPLES as f32 * RATE_HZ as f32 / MEAN_SAMPLES as f32
     }
 
-    /// P_DC counts above no contact at this moment: the mean, corrected for its lag.
-    pub fn counts_now(&self) -> f32 {
+    pub(crate) fn counts_now(&self) -> f32 {
         self.counts() + self.counts_per_s() * (LAG_SAMPLES / RATE_HZ as f32)
     }
 
     /// Contact force in mN, mean over the last 10 ms.
-    pub fn force_mn(&self, calibration: &Calibration) -> f32 {
+    pub(crate) fn force_mn(&self, calibration: &Calibration) -> f32 {
         self.counts() * calibration.force_mn_per_count
     }
 
-    /// Begins a longer mean.
-    pub fn begin_long(&mut self) {
+    pub(crate) fn begin_long(&mut self) {
         self.long = (0, 0);
     }
 
-    /// P_DC counts above no contact, mean since [`ForceMeter::begin_long`]; `None` before the first sample.
-    pub fn long_counts(&self) -> Option<f32> {
+    pub(crate) fn long_counts(&self) -> Option<f32> {
         self.long_mean().map(|mean| mean - self.no_contact)
     }
 
     /// Takes the longer mean as the value of no contact.
-    pub fn zero(&mut self) {
+    pub(crate) fn zero(&mut self) {
         if let Some(counts) = self.long_counts() {
             self.no_contact += counts;
         }
     }
 
     /// Makes the lowest mean from now on the value of no contact: see [`ForceMeter::sink`].
-    pub fn forget_zero(&mut self) {
+    pub(crate) fn forget_zero(&mut self) {
         self.no_contact = f32::from(Counts::MAX.get());
     }
 
     /// Takes the mean over the last 10 ms as the value of no contact if it is lower.
-    pub fn sink(&mut self) {
+    pub(crate) fn sink(&mut self) {
         if let Some(mean) = self.mean() {
             self.no_contact = self.no_contact.min(mean);
         }
     }
 
     /// Mean P_DC over the last 10 ms, counts; `None` before there are 10 ms of samples.
-    pub fn mean(&self) -> Option<f32> {
+    pub(crate) fn mean(&self) -> Option<f32> {
         (self.filled >= MEAN_SAMPLES).then(|| self.newer as f32 / MEAN_SAMPLES as f32)
     }
 
-    /// Mean P_DC since [`ForceMeter::begin_long`], counts; `None` before the first sample.
-    pub fn long_mean(&self) -> Option<f32> {
+    pub(crate) fn long_mean(&self) -> Option<f32> {
         let (sum, samples) = self.long;
         // over ten minutes of samples fit; f64 keeps the fraction
         (samples > 0).then(|| (f64::from(sum) / f64::from(samples)) as f32)
     }
 
-    /// Counts that mean no contact.
-    pub fn no_contact(&self) -> f32 {
+    pub(crate) fn no_contact(&self) -> f32 {
         self.no_contact
     }
 }

@@ -11,10 +11,10 @@ use super::phase::{HIGH_FORCE_MN, most_mn};
 ///
 /// P_DC bends above 2 N, where the skin touches the core, and reads too low (fig. 3); it does not show the part that
 /// silicone adds to a fast press. 2.05 N by P_DC are 2.07 to 2.13 N.
-pub const FORCE_LIMIT_MN: f32 = 2050.0;
+pub(crate) const FORCE_LIMIT_MN: f32 = 2050.0;
 /// The same while a rig that was allowed to presses more than 1.26 N. Friction adds to P_DC, 3 % of the shear in the
 /// model: 2.1 N by P_DC are at most 2.18 N.
-pub const HIGH_FORCE_LIMIT_MN: f32 = 2100.0;
+pub(crate) const HIGH_FORCE_LIMIT_MN: f32 = 2100.0;
 const SILENT_MS: u32 = 10;
 const FROZEN_MS: u32 = 100;
 /// The switch under a lever that stands there is open for so long when the lever has left it: contacts bounce, and the
@@ -75,27 +75,23 @@ impl Unguarded {
     }
 }
 
-/// The guard's inputs of one millisecond.
 #[derive(Clone, Copy, Debug)]
-pub struct GuardInputs<'a> {
+pub(crate) struct GuardInputs<'a> {
     /// Words since the last millisecond; `None` is a damaged one.
-    pub words: &'a [Option<Pressure>],
-    /// The emergency stop.
-    pub e_stop: bool,
+    pub(crate) words: &'a [Option<Pressure>],
+    pub(crate) e_stop: bool,
     /// True if the tasks that the rig serves have not checked in.
-    pub hung: bool,
+    pub(crate) hung: bool,
     /// The lever's upper limit switch, while it should be open.
-    pub lever_top: bool,
+    pub(crate) lever_top: bool,
     /// The lever's upper limit switch is open, while it should be closed.
-    pub lever_left: bool,
+    pub(crate) lever_left: bool,
     /// The limit switch that the stage is moving towards, while it should be open.
-    pub stage_limit: bool,
-    /// Commanded speed of the stage, mm/s.
-    pub stage_wanted_mm_s: f32,
+    pub(crate) stage_limit: bool,
+    pub(crate) stage_wanted_mm_s: f32,
     /// Position of the stage, mm.
-    pub stage_mm: f32,
-    /// Speed of the stage's motor by its back-EMF, mm/s.
-    pub emf_mm_s: f32,
+    pub(crate) stage_mm: f32,
+    pub(crate) emf_mm_s: f32,
 }
 
 /// A limit switch, or the emergency stop. It counts as closed when it has been pressed for 3 ms: less is its bouncing,
@@ -106,7 +102,6 @@ pub(super) struct Switch {
 }
 
 impl Switch {
-    /// Takes another millisecond; returns true if the switch counts as closed.
     pub(super) fn tick(&mut self, closed: bool) -> bool {
         self.closed_ms = if closed {
             self.closed_ms.saturating_add(1)
@@ -117,9 +112,8 @@ impl Switch {
     }
 }
 
-/// Watches over sensor, switches, stage and force.
 #[derive(Clone, Debug, Default)]
-pub struct Guard {
+pub(crate) struct Guard {
     unguarded: Unguarded,
     /// Time without a word of P_AC and of P_DC, ms.
     silent_ms: [u32; 2],
@@ -141,7 +135,7 @@ pub struct Guard {
 
 impl Guard {
     /// A guard that looks for everything but `unguarded`.
-    pub fn new(unguarded: Unguarded) -> Self {
+    pub(crate) fn new(unguarded: Unguarded) -> Self {
         Self {
             unguarded,
             ..Self::default()
@@ -149,19 +143,18 @@ impl Guard {
     }
 
     /// Forgets its history, not the faults that it ignores.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self::new(self.unguarded);
     }
 
-    /// Returns true if `fault` is looked for.
-    pub fn looks_for(&self, fault: Fault) -> bool {
+    pub(crate) fn looks_for(&self, fault: Fault) -> bool {
         !self.unguarded.ignores(fault)
     }
 
     /// One millisecond. `limit_mn` is the force at which the finger is lifted, at most [`HIGH_FORCE_LIMIT_MN`]. The
     /// first of several faults is the one that can hurt most.
     #[inline]
-    pub fn tick(
+    pub(crate) fn tick(
         &mut self,
         inputs: &GuardInputs<'_>,
         meter: &ForceMeter,

@@ -11,13 +11,13 @@ use crate::sensor::FingerModel;
 use crate::sensor::pressure::{Calibration, Counts};
 
 /// Travel of the reference lever per step, um: lead 2 mm, 200 steps, 1/16.
-pub const STEP_UM: f32 = 0.625;
+pub(crate) const STEP_UM: f32 = 0.625;
 /// Steps per second while approaching: 0.5 mm/s (Methods, "Force Control with Stepper Motor").
-pub const APPROACH_STEPS_S: i32 = 800;
+pub(crate) const APPROACH_STEPS_S: i32 = 800;
 /// Steps per second through the air, down to the first contact in P_AC or P_DC: 2 mm/s, at which a stepper stops on a
 /// step. Until the mean of P_DC shows it and the motor stands, 11 ms, it makes 22 um: 50 mN on a hard sample, half of
 /// the lightest press.
-pub const DESCENT_STEPS_S: i32 = 3200;
+pub(crate) const DESCENT_STEPS_S: i32 = 3200;
 /// After that the lever stands until the whole mean of P_DC, 10 ms, and the one before are of the standing finger.
 const REST_MS: u32 = 20;
 /// It goes slowly from this far above the last contact on, 0.15 mm: that was seen some hundredths of a millimetre below
@@ -100,9 +100,8 @@ const ZERO_MS: u32 = 200;
 /// Vibration of the motor dies down before the zero is taken.
 const QUIET_MS: u32 = 100;
 
-/// The states of the lever.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub enum LeverState {
+pub(crate) enum LeverState {
     /// Its position is not known, the motor stands.
     #[default]
     Unknown,
@@ -110,7 +109,6 @@ pub enum LeverState {
     Homing,
     /// The same of a lifted finger that waits: the place of the sample stays known.
     Parking,
-    /// Lifted and standing.
     Lifted,
     /// Lifted, and P_DC without contact is measured.
     Zeroing,
@@ -126,9 +124,8 @@ pub enum LeverState {
     Retracting(i32),
 }
 
-/// The state machine of the lever.
 #[derive(Clone, Debug)]
-pub struct Lever {
+pub(crate) struct Lever {
     finger: &'static FingerModel,
     state: LeverState,
     /// Target force, in counts above no contact.
@@ -138,7 +135,6 @@ pub struct Lever {
     stood: usize,
     first: f32,
     pressed: f32,
-    /// Counts that the trims have pressed on by.
     crept: f32,
     /// Counts of P_DC per step near the target, learned during the approach.
     counts_per_step: f32,
@@ -151,7 +147,6 @@ pub struct Lever {
     known: bool,
     /// Lifted, its limit switch was closed.
     at_switch: bool,
-    /// Count of steps at the last contact.
     contact: Option<i32>,
     /// True if the lever comes down through the air; then the time that it stands where it touched, ms.
     descends: bool,
@@ -162,7 +157,7 @@ pub struct Lever {
 
 impl Lever {
     /// A lever whose place is unknown, for such a finger, with all guards but `unguarded`.
-    pub fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
+    pub(crate) fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
         Self::with(finger, Progress::new(finger, unguarded))
     }
 
@@ -191,12 +186,11 @@ impl Lever {
     }
 
     /// Forgets its place: it may be moved by hand now.
-    pub fn lose(&mut self) {
+    pub(crate) fn lose(&mut self) {
         *self = Self::with(self.finger, self.progress.clone());
     }
 
-    /// Takes a sample of P_AC.
-    pub fn hear(&mut self, pac: Counts, calibration: &Calibration) {
+    pub(crate) fn hear(&mut self, pac: Counts, calibration: &Calibration) {
         match self.state {
             LeverState::Lifted | LeverState::Zeroing => self.progress.rest(pac.get()),
             LeverState::Approaching(_) => self.progress.hear(pac.get(), calibration),
@@ -204,51 +198,49 @@ impl Lever {
         }
     }
 
-    /// The current state.
-    pub fn state(&self) -> LeverState {
+    pub(crate) fn state(&self) -> LeverState {
         self.state
     }
 
     /// Returns true if the finger is certainly off the sample and the motor stands.
-    pub fn is_lifted(&self) -> bool {
+    pub(crate) fn is_lifted(&self) -> bool {
         self.state == LeverState::Lifted
     }
 
     /// Returns true if it is lifted and has stood so long that P_DC no longer shows its way.
-    pub fn rests(&self) -> bool {
+    pub(crate) fn rests(&self) -> bool {
         self.is_lifted() && self.ms > RESTS_MS
     }
 
-    /// Returns true if the finger is lifted and goes up to the limit switch.
-    pub fn is_parking(&self) -> bool {
+    pub(crate) fn is_parking(&self) -> bool {
         self.state == LeverState::Parking
     }
 
     /// Returns true if it stands at the limit switch, so that the switch must be closed.
-    pub fn is_at_switch(&self) -> bool {
+    pub(crate) fn is_at_switch(&self) -> bool {
         self.at_switch && matches!(self.state, LeverState::Lifted | LeverState::Zeroing)
     }
 
     /// Returns true if it is so far below the limit switch that the switch must be open.
-    pub fn is_down(&self, steps: i32) -> bool {
+    pub(crate) fn is_down(&self, steps: i32) -> bool {
         let known = !matches!(self.state, LeverState::Unknown | LeverState::Homing);
         known && steps - self.top > NEAR_TOP_STEPS
     }
 
     /// P_DC without contact as it was measured for the last press since homing.
-    pub fn zero(&self) -> Option<f32> {
+    pub(crate) fn zero(&self) -> Option<f32> {
         self.zero
     }
 
     /// Goes up to the limit switch. This also lifts the finger after any fault: a lever that knows its place trusts the
     /// switch only at the top, for a switch that sticks must not leave the finger down.
-    pub fn home(&mut self) {
+    pub(crate) fn home(&mut self) {
         self.enter(LeverState::Homing);
     }
 
     /// Brings a finger that hangs over the sample up to the limit switch, which shows whether it stays lifted,
     /// independent of the sensor. Returns true if the way begins.
-    pub fn park(&mut self) -> bool {
+    pub(crate) fn park(&mut self) -> bool {
         let hangs = self.is_lifted() && !self.at_switch;
         if hangs {
             self.enter(LeverState::Parking);
@@ -258,17 +250,17 @@ impl Lever {
 
     /// Counts another millisecond of waiting: parks the lifted finger if it has waited for too long. Returns true if
     /// the way begins.
-    pub fn wait(&mut self) -> bool {
+    pub(crate) fn wait(&mut self) -> bool {
         self.ms >= HANGS_MS && self.park()
     }
 
     /// Requires another homing. The top stays known.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.enter(LeverState::Unknown);
     }
 
     /// Measures P_DC without contact, then presses until P_DC has risen by `target` counts. Only a lifted lever does.
-    pub fn press(&mut self, target: f32) -> bool {
+    pub(crate) fn press(&mut self, target: f32) -> bool {
         let lifted = self.is_lifted();
         if lifted {
             self.target = target;
@@ -277,8 +269,7 @@ impl Lever {
         lifted
     }
 
-    /// Lifts the finger clear of the sample.
-    pub fn lift(&mut self, steps: i32) {
+    pub(crate) fn lift(&mut self, steps: i32) {
         match self.contact {
             Some(contact) if self.state != LeverState::Unknown => {
                 self.enter(LeverState::Retracting(
@@ -289,8 +280,7 @@ impl Lever {
         }
     }
 
-    /// Forgets where contact was: another sample may be thicker.
-    pub fn forget_contact(&mut self) {
+    pub(crate) fn forget_contact(&mut self) {
         self.contact = None;
     }
 
@@ -302,43 +292,49 @@ impl Lever {
         self.ms = 0;
     }
 
+    #[inline]
+    fn go_up(&mut self, steps: i32, at_top: bool) -> Result<i32, Fault> {
+        // Lower than it was, the lever continues: if the switch is stuck, that is right; if steps were lost, it
+        // stands at its hard stop until the count is right again. Higher, and steps up were lost: there the top
+        // is now.
+        if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
+            self.top = if self.known {
+                self.top.min(steps)
+            } else {
+                steps
+            };
+            self.known = true;
+            self.at_switch = true;
+            if !self.is_parking() {
+                self.contact = None;
+                self.zero = None;
+            }
+            self.enter(LeverState::Lifted);
+            return Ok(0);
+        }
+        // the whole travel and a quarter, at the speed of lifting
+        let longest_ms = MAX_STEPS as u32 * 1250 / RETRACT_STEPS_S.unsigned_abs();
+        if self.ms > longest_ms {
+            Err(Fault::LeverNotHome)
+        } else {
+            Ok(RETRACT_STEPS_S)
+        }
+    }
+
     /// One millisecond: `steps` made so far (downwards positive), and whether the limit switch is pressed. Returns the
     /// steps per second to make now, downwards positive.
-    ///
-    /// # Errors
-    /// The motor is to stand; the guard then lifts the finger.
+    /// Errors: the motor is to stand; the guard then lifts the finger.
     #[inline]
-    pub fn tick(&mut self, meter: &mut ForceMeter, steps: i32, at_top: bool) -> Result<i32, Fault> {
+    pub(crate) fn tick(
+        &mut self,
+        meter: &mut ForceMeter,
+        steps: i32,
+        at_top: bool,
+    ) -> Result<i32, Fault> {
         self.ms = self.ms.saturating_add(1);
         match self.state {
             LeverState::Unknown | LeverState::Lifted | LeverState::Holding => Ok(0),
-            LeverState::Homing | LeverState::Parking => {
-                // Lower than it was, the lever continues: if the switch is stuck, that is right; if steps were lost, it
-                // stands at its hard stop until the count is right again. Higher, and steps up were lost: there the top
-                // is now.
-                if at_top && (!self.known || steps - self.top <= SWITCH_STEPS) {
-                    self.top = if self.known {
-                        self.top.min(steps)
-                    } else {
-                        steps
-                    };
-                    self.known = true;
-                    self.at_switch = true;
-                    if !self.is_parking() {
-                        self.contact = None;
-                        self.zero = None;
-                    }
-                    self.enter(LeverState::Lifted);
-                    return Ok(0);
-                }
-                // the whole travel and a quarter, at the speed of lifting
-                let longest_ms = MAX_STEPS as u32 * 1250 / RETRACT_STEPS_S.unsigned_abs();
-                if self.ms > longest_ms {
-                    Err(Fault::LeverNotHome)
-                } else {
-                    Ok(RETRACT_STEPS_S)
-                }
-            }
+            LeverState::Homing | LeverState::Parking => self.go_up(steps, at_top),
             LeverState::Zeroing => {
                 if self.ms == QUIET_MS {
                     meter.begin_long();

@@ -79,9 +79,7 @@ pub struct RigOverLink {
     /// P_DC in the air was measured since the rig homed.
     zeroed: bool,
     air: Option<f32>,
-    /// P_DC above no contact of the still finger, mean of the background.
     still: f32,
-    /// Weight that may be laid on the lifted finger, mN.
     expected_mn: f32,
 }
 
@@ -161,9 +159,7 @@ impl RigOverLink {
     }
 
     /// Takes other constants, between movements.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
+    /// Errors: [`Refused::Busy`], or [`Refused::Calibration`] for constants that cannot be used.
     pub fn calibrate(&mut self, calibration: RigCalibration) -> Result<(), Refused> {
         if self.phase != Phase::Ready && !self.is_at_rest() {
             return Err(Refused::Busy);
@@ -179,9 +175,6 @@ impl RigOverLink {
     }
 
     /// Orders the arm to lift the finger, and takes P_DC there as that of no contact.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     pub fn home(&mut self) -> Result<(), Refused> {
         match self.phase {
             Phase::Parked | Phase::Ready => {
@@ -195,9 +188,7 @@ impl RigOverLink {
     }
 
     /// Ends a fault.
-    ///
-    /// # Errors
-    /// [`Refused::Busy`] while the finger is still being lifted.
+    /// Errors: [`Refused::Busy`] while the finger is still being lifted.
     pub fn reset(&mut self) -> Result<(), Refused> {
         if let Phase::Faulted(_) = self.phase {
             if !self.is_at_rest() {
@@ -210,9 +201,6 @@ impl RigOverLink {
     }
 
     /// Makes one movement, beginning at `start`: 0 to 1 of the length that the sample leaves.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     pub fn start(&mut self, movement: Movement, start: f32) -> Result<(), Refused> {
         self.may_start()?;
         let force_mn = movement.force_mn();
@@ -230,11 +218,7 @@ impl RigOverLink {
         Ok(())
     }
 
-    /// Measures P_DC in the air: [`RigOverLink::air_counts`].
-    ///
-    /// # Errors
-    /// See [`Refused`].
-    pub fn measure_air(&mut self) -> Result<(), Refused> {
+    pub(crate) fn measure_air(&mut self) -> Result<(), Refused> {
         self.may_start()?;
         self.ended = None;
         self.air = None;
@@ -244,9 +228,6 @@ impl RigOverLink {
     }
 
     /// Expects a person to lay a weight of so many mN on the lifted finger; 0 ends that.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     pub fn weigh(&mut self, mn: u16) -> Result<(), Refused> {
         self.may_start()?;
         self.expected_mn = f32::from(mn);
@@ -400,7 +381,6 @@ impl RigOverLink {
         }
     }
 
-    /// Takes the arm's progress.
     fn heard(&mut self, state: ArmState) {
         let there = match (self.phase, state) {
             (Phase::Faulted(_), ArmState::Lifted) => true,
@@ -423,7 +403,6 @@ impl RigOverLink {
         }
     }
 
-    /// Checks the time limits.
     fn wait(&mut self) {
         let (most_ms, waited_ms) = match self.phase {
             Phase::Homing | Phase::Lifting => (LIFTS_MS, self.ms),

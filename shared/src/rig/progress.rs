@@ -52,15 +52,12 @@ const FINGER_STEPS: f32 = 54.0;
 /// P_AC always has noise: the guard checks a value that has been the same for 10 ms; it counts for nothing here.
 const FROZEN_SAMPLES: u32 = RATE_HZ / 100;
 
-/// The beginning of a piece.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     steps: i32,
-    /// P_DC above no contact.
     counts: f32,
 }
 
-/// Progress of a press.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
     finger: &'static FingerModel,
@@ -87,7 +84,6 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Checks such a finger by all guards but `unguarded`.
     pub(super) fn new(finger: &'static FingerModel, unguarded: Unguarded) -> Self {
         Self {
             finger,
@@ -106,7 +102,6 @@ impl Progress {
         }
     }
 
-    /// The finger was lifted: its P_AC at rest is measured anew.
     pub(super) fn lifted(&mut self) {
         *self = Self::new(self.finger, self.unguarded);
     }
@@ -141,15 +136,12 @@ impl Progress {
         self.of_piece += rise;
     }
 
-    /// Returns true if P_AC shows a contact that P_DC does not.
     pub(super) fn is_touched(&self) -> bool {
         self.touched.is_some()
     }
 
     /// Checks a millisecond of an approach: the steps made, P_DC above no contact, and whether it shows contact.
-    ///
-    /// # Errors
-    /// [`Fault::PressureDead`] or [`Fault::LeverSlips`].
+    /// Errors: [`Fault::PressureDead`] or [`Fault::LeverSlips`].
     #[inline]
     pub(super) fn judge(&mut self, steps: i32, counts: f32, contact: bool) -> Result<(), Fault> {
         if self.same >= FROZEN_SAMPLES {

@@ -12,7 +12,7 @@ pub const WARN_J: f32 = 8.0;
 /// Factor of wear per joule at this sliding power: the paper found that movements of high power wear the fingerprints
 /// off, which slow or light ones of the same energy do not. Chosen: twice as bad at the limit of
 /// [`Movement::is_high_wear`], and in proportion above.
-pub fn wearing(power_mw: f32) -> f32 {
+pub(crate) fn wearing(power_mw: f32) -> f32 {
     1.0 + power_mw / Movement::WEAR_LIMIT_MW
 }
 
@@ -41,7 +41,6 @@ impl Sum {
 /// Sliding since the skin was replaced.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct SkinCare {
-    /// Energy in J, plain and weighted.
     energy_j: Sum,
     wear_j: Sum,
 }

@@ -19,11 +19,9 @@ pub(super) const LINK_MS: u32 = 150;
 /// Largest difference between the P_AC words of a slide and the number that its time holds.
 const WORDS_OFF: u32 = 4;
 
-/// One run of the stage.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     movement: Movement,
-    /// Beginning and end of the slide, mm.
     path_mm: (f32, f32),
     /// Constant speed, as ms since the run began.
     steady_ms: Range<u32>,
@@ -32,14 +30,11 @@ pub(super) struct Run {
     baseline: i32,
     /// Words that were damaged or missing, from the background on.
     damaged: u32,
-    /// P_AC words of the slide so far.
     words: u32,
-    /// Sum of the motor's currents at constant speed, A, and their number.
     current: (f32, u32),
 }
 
 impl Run {
-    /// No run was made yet.
     pub(super) const NONE: Self = Self {
         movement: Movement::FOR_ROUGHNESS,
         path_mm: (0.0, 0.0),
@@ -108,12 +103,10 @@ impl Run {
         }
     }
 
-    /// The current movement.
     pub(super) fn movement(&self) -> Movement {
         self.movement
     }
 
-    /// Beginning and end of the slide, mm.
     pub(super) fn path_mm(&self) -> (f32, f32) {
         self.path_mm
     }
@@ -135,7 +128,6 @@ impl Run {
         self.baseline = ((sum + samples / 2) / samples.max(1)) as i32;
     }
 
-    /// A tick of the background.
     pub(super) fn still(&mut self, inputs: &Inputs, outputs: &mut Outputs) {
         self.feel(inputs, outputs);
         outputs.sample_phase = SamplePhase::Still;
@@ -166,7 +158,6 @@ impl Run {
         }
     }
 
-    /// Mean motor current at constant speed, A; `None` if there was no such time.
     pub(super) fn mean_current_a(&self) -> Option<f32> {
         let (sum, ticks) = self.current;
         (ticks > 0).then(|| sum / ticks as f32)
@@ -177,7 +168,6 @@ impl Run {
         self.steady_ms.end = self.steady_ms.end.min(ms.saturating_add(1));
     }
 
-    /// The end of a slide of so many ms.
     pub(super) fn ended(&mut self, ms: u32) -> Ended {
         let missing = samples(ms).abs_diff(self.words);
         self.damaged += if missing > WORDS_OFF { missing } else { 0 };
@@ -205,7 +195,6 @@ impl Run {
     }
 }
 
-/// P_AC words of a tick, counts.
 fn pac(inputs: &Inputs) -> impl Iterator<Item = u16> {
     let words = inputs.words.iter().flatten();
     words
@@ -213,7 +202,6 @@ fn pac(inputs: &Inputs) -> impl Iterator<Item = u16> {
         .map(|word| word.counts.get())
 }
 
-/// Samples of a channel in so many ms.
 fn samples(ms: u32) -> u32 {
     (u64::from(ms) * u64::from(RATE_HZ) / 1000) as u32
 }

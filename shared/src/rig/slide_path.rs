@@ -9,8 +9,7 @@ pub struct SlidePath {
     pub speed_mm_s: f32,
     /// Distance at constant speed in mm.
     pub length_mm: f32,
-    /// Acceleration of both ramps in mm/s^2.
-    pub acceleration_mm_s2: f32,
+    pub(crate) acceleration_mm_s2: f32,
 }
 
 impl SlidePath {
@@ -40,11 +39,6 @@ impl SlidePath {
         self.length_mm / self.speed_mm_s
     }
 
-    /// Duration from rest to rest in s.
-    pub fn duration_s(&self) -> f32 {
-        self.steady_s() + 2.0 * self.ramp_s()
-    }
-
     /// Travel from rest to rest in mm: each ramp takes v^2 / 2a.
     pub fn travel_mm(&self) -> f32 {
         self.length_mm + self.speed_mm_s * self.ramp_s()
@@ -52,7 +46,7 @@ impl SlidePath {
 
     /// Range of the slide's start in mm behind the first possible one, so that the finger stays on a sample of
     /// `sample_mm`; `None` if the slide does not fit at all.
-    pub fn start_room_mm(&self, sample_mm: f32) -> Option<f32> {
+    pub(crate) fn start_room_mm(&self, sample_mm: f32) -> Option<f32> {
         let margin = sample_mm - self.travel_mm();
         (margin >= 0.0).then_some(margin)
     }
@@ -73,7 +67,6 @@ mod tests {
             };
             assert!((path.steady_s() - steady_s).abs() < 1e-3);
             assert!((path.travel_mm() - 75.0).abs() < 1e-4);
-            assert!((path.duration_s() - (path.steady_s() + 2.0 * speed / 1000.0)).abs() < 1e-6);
         }
     }
 

@@ -10,23 +10,20 @@ pub struct StageConstants {
     /// Length of the travel between the limit switches, mm.
     pub travel_mm: f32,
     /// Acceleration of every ramp, mm/s^2.
-    pub acceleration_mm_s2: f32,
+    pub(crate) acceleration_mm_s2: f32,
     /// Feed-forward: duty per mm/s, and per mm/s^2.
-    pub duty_per_mm_s: f32,
-    /// See above.
-    pub duty_per_mm_s2: f32,
+    pub(crate) duty_per_mm_s: f32,
+    pub(crate) duty_per_mm_s2: f32,
     /// Feed-forward: duty that overcomes the friction of the moving stage, with a finger on it.
-    pub duty_friction: f32,
+    pub(crate) duty_friction: f32,
     /// Proportional gain: duty per mm/s of velocity error.
     pub p: f32,
     /// Integral gain: duty per mm; the integral of the velocity error is the position error.
     pub i: f32,
     /// Supply of the bridge, V.
     pub supply_v: f32,
-    /// Resistance of motor, leads and bridge, ohm.
-    pub resistance_ohm: f32,
-    /// Back-EMF, V per mm/s.
-    pub emf_v_per_mm_s: f32,
+    pub(crate) resistance_ohm: f32,
+    pub(crate) emf_v_per_mm_s: f32,
 }
 
 impl StageConstants {
@@ -48,7 +45,7 @@ impl StageConstants {
 
     /// Speed in mm/s at which the motor must be turning, from its voltage and current: tells a blocked stage from a
     /// silent encoder.
-    pub fn emf_speed_mm_s(&self, duty: f32, current_a: f32) -> f32 {
+    pub(crate) fn emf_speed_mm_s(&self, duty: f32, current_a: f32) -> f32 {
         (duty * self.supply_v - current_a * self.resistance_ohm) / self.emf_v_per_mm_s
     }
 }
@@ -60,7 +57,7 @@ const FOLLOWING_S: f32 = 0.04;
 /// Velocity is taken over this many ms of encoder counts.
 const VELOCITY_MS: usize = 2;
 /// Distance kept from the limit switches, mm.
-pub const MARGIN_MM: f32 = 1.0;
+pub(super) const MARGIN_MM: f32 = 1.0;
 /// Most duty from the integral: enough for a loaded stage, and not for one that runs away without an encoder.
 const MAX_INTEGRAL: f32 = 0.25;
 /// The same while homing, when no guard tells a blocked stage from a silent encoder: less is allowed.
@@ -78,22 +75,18 @@ const ARRIVED_MM: f32 = 0.3;
 /// It has time for that after the profile's end, ms.
 const ARRIVE_MS: u32 = 300;
 
-/// The states of the stage.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum StageState {
+pub(crate) enum StageState {
     /// The position is unknown; the motor is off.
     Unknown,
     /// Towards the left limit switch.
     Homing(Profile),
-    /// Standing; the motor is off.
     Standing,
-    /// On its way.
     Moving(Profile),
 }
 
-/// Rest to rest: ramp, constant speed, ramp.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Profile {
+pub(crate) struct Profile {
     from_mm: f32,
     direction: f32,
     distance_mm: f32,
@@ -142,18 +135,16 @@ impl Profile {
         }
     }
 
-    /// Duration in s.
-    pub fn duration_s(&self) -> f32 {
+    pub(crate) fn duration_s(&self) -> f32 {
         self.duration_s
     }
 
-    /// Velocity in mm/s at this moment of the move.
-    pub fn velocity_mm_s(&self) -> f32 {
+    pub(crate) fn velocity_mm_s(&self) -> f32 {
         self.at(self.ms as f32 * 1e-3).1
     }
 
     /// Position in mm, velocity in mm/s and acceleration in mm/s^2 at `t` seconds.
-    pub fn at(&self, t: f32) -> (f32, f32, f32) {
+    pub(crate) fn at(&self, t: f32) -> (f32, f32, f32) {
         let (ramp, end) = (self.ramp_s, self.duration_s);
         let a = self.acceleration_mm_s2;
         let (way, v, a) = if t >= end {
@@ -174,14 +165,12 @@ impl Profile {
     }
 }
 
-/// The state machine of the stage.
 #[derive(Clone, Debug)]
-pub struct Stage {
+pub(crate) struct Stage {
     constants: StageConstants,
     state: StageState,
     /// Encoder count at position 0, the left limit switch.
     zero: i32,
-    /// The last counts, newest last.
     counts: [i32; VELOCITY_MS + 1],
     /// The limit switch was found in search, and is to be touched slowly.
     searched: bool,
@@ -189,7 +178,7 @@ pub struct Stage {
 
 impl Stage {
     /// A stage whose position is unknown.
-    pub fn new(constants: StageConstants) -> Self {
+    pub(crate) fn new(constants: StageConstants) -> Self {
         Self {
             constants,
             state: StageState::Unknown,
@@ -199,23 +188,20 @@ impl Stage {
         }
     }
 
-    /// The current state.
-    pub fn state(&self) -> StageState {
+    pub(crate) fn state(&self) -> StageState {
         self.state
     }
 
-    /// Its constants.
-    pub fn constants(&self) -> &StageConstants {
+    pub(crate) fn constants(&self) -> &StageConstants {
         &self.constants
     }
 
     /// Position in mm from the left limit switch.
-    pub fn position_mm(&self) -> f32 {
+    pub(crate) fn position_mm(&self) -> f32 {
         (self.now() - self.zero) as f32 * self.constants.mm_per_count
     }
 
-    /// Velocity in mm/s, mean over the last 2 ms.
-    pub fn velocity_mm_s(&self) -> f32 {
+    pub(crate) fn velocity_mm_s(&self) -> f32 {
         let [oldest, ..] = self.counts;
         (self.now() - oldest) as f32 * self.constants.mm_per_count * (1000.0 / VELOCITY_MS as f32)
     }
@@ -227,7 +213,7 @@ impl Stage {
 
     /// Looks for the left limit switch: in search first, and when that has found it and the stage is off it again,
     /// slowly.
-    pub fn home(&mut self) {
+    pub(crate) fn home(&mut self) {
         let (way, speed_mm_s) = if self.searched {
             (TOUCH_MM, TOUCH_MM_S)
         } else {
@@ -242,14 +228,14 @@ impl Stage {
     }
 
     /// Returns true if the limit switch still has to be touched slowly: call [`Stage::home`] once more.
-    pub fn is_searched(&self) -> bool {
+    pub(crate) fn is_searched(&self) -> bool {
         self.searched
     }
 
     /// Moves to `to_mm`, kept [`MARGIN_MM`] from the limit switches. Only a standing stage does; the profile gives the
     /// time.
     #[inline]
-    pub fn go(&mut self, to_mm: f32, speed_mm_s: f32) -> Option<Profile> {
+    pub(crate) fn go(&mut self, to_mm: f32, speed_mm_s: f32) -> Option<Profile> {
         if self.state != StageState::Standing {
             return None;
         }
@@ -262,13 +248,12 @@ impl Stage {
     }
 
     /// The motor goes off, and the stage no longer knows where it is.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.state = StageState::Unknown;
         self.searched = false;
     }
 
-    /// The motor goes off, from any state.
-    pub fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         if self.searched || matches!(self.state, StageState::Unknown | StageState::Homing(_)) {
             self.forget();
         } else {
@@ -278,7 +263,7 @@ impl Stage {
 
     /// Ends a way as soon as the acceleration of its ramps allows; the stage stands then as at the end of any.
     #[inline]
-    pub fn brake(&mut self) {
+    pub(crate) fn brake(&mut self) {
         if let StageState::Moving(profile) = &mut self.state {
             profile.brake();
         }
@@ -286,11 +271,9 @@ impl Stage {
 
     /// One millisecond: the encoder's count, and whether the left limit switch is pressed. Returns the duty of the
     /// motor, -1 to 1.
-    ///
-    /// # Errors
-    /// The motor is to be off.
+    /// Errors: the motor is to be off.
     #[inline]
-    pub fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, Fault> {
+    pub(crate) fn tick(&mut self, count: i32, at_left: bool) -> Result<f32, Fault> {
         self.counts.rotate_left(1);
         let [.., newest] = &mut self.counts;
         *newest = count;

@@ -23,7 +23,6 @@ pub struct Steps {
     steps: i32,
     phase: u32,
     down: bool,
-    /// The period that comes has a pulse.
     pulse: bool,
 }
 

@@ -13,26 +13,24 @@ const MG_PER_COUNT: f32 = mems::PARTS.model.calibration.pac_pa_per_count;
 const COUNTS_PER_G: f32 = 1e3 / MG_PER_COUNT;
 /// Plausible values of a count, mg: within a tenth of the data sheet's (chosen, since its own limits could not be
 /// read). A finger that is turned over 15 degrees askew shows 3 % less.
-pub const PLAUSIBLE_MG: RangeInclusive<f32> = 0.9 * MG_PER_COUNT..=1.1 * MG_PER_COUNT;
+pub(crate) const PLAUSIBLE_MG: RangeInclusive<f32> = 0.9 * MG_PER_COUNT..=1.1 * MG_PER_COUNT;
 /// Largest offset of its zero, mg (chosen, for the same reason).
 const MOST_OFFSET_MG: f32 = 250.0;
 
-/// First one way, then the other.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Turning {
+pub(crate) struct Turning {
     still: Still,
     first: Option<f32>,
 }
 
 impl Turning {
-    /// Returns true if it has been still the first way, and is to be turned over now.
-    pub fn wants_turn(&self) -> bool {
+    pub(crate) fn wants_turn(&self) -> bool {
         self.first.is_some()
     }
 
     /// Takes gravity along the finger, counts of P_AC ([`crate::sensor::AnyFinger::gravity`]),
     /// [`LOOKS_HZ`](super::weigh::LOOKS_HZ) times a second. Both ways, once it has been still in each.
-    pub fn take(&mut self, counts: f32) -> Option<Turned> {
+    pub(crate) fn take(&mut self, counts: f32) -> Option<Turned> {
         let mean = self.still.take(counts)?;
         if libm::fabsf(mean) < LEAST {
             return None;

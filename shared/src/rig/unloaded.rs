@@ -35,11 +35,8 @@ impl UnloadedRuns {
         }
     }
 
-    /// `calibration` with the current that was measured.
-    ///
-    /// # Errors
-    /// [`RigCalibrationError::Points`] also before all runs are made; [`RigCalibrationError::NoLine`], and the errors
-    /// of [`RigCalibration::check`].
+    /// `calibration` with the current that was measured. Errors: [`RigCalibrationError::Points`] also before all runs
+    /// are made; [`RigCalibrationError::NoLine`], and the errors of [`RigCalibration::check`].
     #[inline]
     pub fn finish(
         &self,

@@ -1,7 +1,7 @@
 //! Known weights on the finger: the moment at which one lies still, and the force per count that they give.
 
 /// Looks in a second at P_DC under a weight.
-pub const LOOKS_HZ: u32 = 100;
+pub(crate) const LOOKS_HZ: u32 = 100;
 /// Looks for which it has to lie still: its mean is of 1.5 s.
 const STILL: u32 = 3 * LOOKS_HZ / 2;
 /// Counts that P_DC may wander meanwhile, and the share of it.
@@ -15,7 +15,6 @@ const GONE_MN: f32 = 100.0;
 /// (chosen).
 const OFF: (f32, f32) = (30.0, 0.08);
 
-/// Waits for something to keep still.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct Still {
     mean: f32,
@@ -38,21 +37,19 @@ impl Still {
     }
 }
 
-/// The air, and then one weight.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Weighing {
+pub(crate) struct Weighing {
     /// Counts by which a weight differs from the air at least.
     least: f32,
     /// Counts by which the air differs from itself at most, once a weight has been taken away.
     gone: f32,
-    /// P_DC in the air, once it was still.
     air: Option<f32>,
     still: Still,
 }
 
 impl Weighing {
     /// A weight of so many mN is to be put on, or is still there from before: first the finger is in the air.
-    pub fn new(mn: u16, mn_per_count: f32) -> Self {
+    pub(crate) fn new(mn: u16, mn_per_count: f32) -> Self {
         Self {
             least: THERE * f32::from(mn) / mn_per_count,
             gone: GONE_MN / mn_per_count,
@@ -62,27 +59,25 @@ impl Weighing {
     }
 
     /// The same for a finger that is in the air: P_DC there is 0 counts.
-    pub fn in_air(mn: u16, mn_per_count: f32) -> Self {
+    pub(crate) fn in_air(mn: u16, mn_per_count: f32) -> Self {
         Self {
             air: Some(0.0),
             ..Self::new(mn, mn_per_count)
         }
     }
 
-    /// Returns true if the weight is to be put on now.
-    pub fn wants_weight(&self) -> bool {
+    pub(crate) fn wants_weight(&self) -> bool {
         self.air.is_some()
     }
 
-    /// Returns true if P_DC shows that the weight has been taken away again.
-    pub fn is_air(&self, counts: f32) -> bool {
+    pub(crate) fn is_air(&self, counts: f32) -> bool {
         libm::fabsf(counts - self.air.unwrap_or_default()) < self.gone
     }
 
     /// Takes P_DC, counts about that in the air as it was known before, [`LOOKS_HZ`] times a second. The weight's mean
     /// above the air, once it has lain still; below 0 where P_DC falls under it, as that of a load cell that is wired
     /// the wrong way round.
-    pub fn take(&mut self, counts: f32) -> Option<f32> {
+    pub(crate) fn take(&mut self, counts: f32) -> Option<f32> {
         let mean = self.still.take(counts)?;
         let above = mean - self.air.unwrap_or_default();
         let there = libm::fabsf(above) >= self.least;

@@ -30,7 +30,7 @@ impl Drift {
 
 /// One of what people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Told {
+pub enum VerdictKind {
     New,
     Changed,
     Sure,
@@ -255,7 +255,7 @@ impl Judge {
     }
 
     /// What is told after slides of this mean, and the most probable texture.
-    pub fn tell(&self, z: &[f64], k: usize, alpha: f64) -> (Told, usize) {
+    pub fn tell(&self, z: &[f64], k: usize, alpha: f64) -> (VerdictKind, usize) {
         let surprises = self.surprises(z, k, 0);
         let least = surprises.iter().copied().fold(f64::INFINITY, f64::min);
         let sum: f64 = surprises.iter().map(|a| (least - a).exp()).sum();
@@ -266,10 +266,10 @@ impl Judge {
             self.score(z, k, which) > limits.fold(f64::INFINITY, f64::min)
         };
         let told = match () {
-            () if over(0) => Told::New,
-            () if over(1) => Told::Changed,
-            () if 1.0 / sum > SURE => Told::Sure,
-            () => Told::Undecided,
+            () if over(0) => VerdictKind::New,
+            () if over(1) => VerdictKind::Changed,
+            () if 1.0 / sum > SURE => VerdictKind::Sure,
+            () => VerdictKind::Undecided,
         };
         (told, best)
     }

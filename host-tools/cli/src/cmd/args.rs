@@ -50,9 +50,9 @@ pub(crate) struct Stop {
 /// What a fused table that is learned expects.
 #[derive(Args, Clone)]
 pub(crate) struct Expecting {
-    /// How much fingers and samples change from one session to the next, for a table that is learned with the method fused:
-    /// standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and samples that
-    /// stay where they are
+    /// How much fingers and samples change from one session to the next, for a table that is learned with the method
+    /// fused: standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and
+    /// samples that stay where they are
     #[arg(long, value_name = "BANDS,TRACTION|0", default_value = "0.1,0.04", value_parser = drift)]
     pub(crate) drift: Drift,
 }

@@ -53,7 +53,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     if let Some(canvas) = canvas {
         let figure = confusion(&courses, &names, args.stop.threshold)?;
-        canvas.write("tactus evaluate", &[figure], out)?;
+        canvas.write(&[figure], out)?;
     }
     Ok(())
 }

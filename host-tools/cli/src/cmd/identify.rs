@@ -56,7 +56,7 @@ Examples:
   tactus identify --simulated --among 117 --method paper      as published: one property a slide, 117 textures
   tactus identify --recordings DIR --material 'bath towel'
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
-  tactus identify --simulated --plot burlap.svg               with pictures
+  tactus identify --simulated --plot pictures                 with pictures
 
 --plot draws how probable each texture was (posterior), and the unknown beside its two best
 candidates (spectrum).")]
@@ -241,12 +241,12 @@ impl<'t> Presented<'t> {
     ) -> anyhow::Result<()> {
         let Some(canvas) = canvas else { return Ok(()) };
         let figures = self.exploration.figures(args.stop.threshold)?;
-        canvas.write("tactus identify", &figures, out)
+        canvas.write(&figures, out)
     }
 }
 
-/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text, shows
-/// every step.
+/// Explores with `rig` until there is an answer or, after a slide at least, until it has `ran_out` of them; as text,
+/// shows every step.
 fn explore_and_show<R>(
     rig: &mut R,
     presented: &mut Presented<'_>,

@@ -34,7 +34,8 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
-    /// Slides to learn from, per texture and movement: the first ones of the session, or as many as there are, two at least
+    /// Slides to learn from, per texture and movement: the first ones of the session, or as many as there are, two at
+    /// least
     #[arg(long, value_name = "N", default_value_t = 5)]
     train_slides: usize,
     /// The way of deciding that the table is for: fused, or the others, which share one kind of table
@@ -48,8 +49,8 @@ pub(crate) struct Args {
     /// Share of the known textures that may be taken for new ones, unless `identify` says otherwise
     #[arg(long, value_name = "SHARE", default_value_t = FALSE_ALARM, value_parser = false_alarm)]
     false_alarm: f32,
-    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end early
-    /// then. The image tactus-rig takes such a table, the others refuse it
+    /// Learn the first parts of the slides too, of these lengths, s at constant speed, such as 1,2,3: slides may end
+    /// early then. The image tactus-rig takes such a table, the others refuse it
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
     /// The file to write; "-": standard output
@@ -134,7 +135,8 @@ fn with_lengths(
     let lengths_ms = rising(&args.lengths)?;
     ensure!(
         !Table::read(&bytes)?.is_paced(),
-        "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not both"
+        "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not \
+         both"
     );
     let textures = set.textures().len() as u64;
     let slides = with_progress(textures, "measuring first parts", |done| {
@@ -186,7 +188,8 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     Ok(())
 }
 
-/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this folder.
+/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this
+/// folder.
 pub(crate) struct LearnedHere {
     first: usize,
     met: HashMap<(String, Movement), usize>,
@@ -224,7 +227,8 @@ pub(crate) fn learned_here(
     }
 }
 
-/// Returns the slides as their first parts of the `n`th length. What stands for one that is not longer says nothing: see [`is_longer`].
+/// Returns the slides as their first parts of the `n`th length. What stands for one that is not longer says nothing:
+/// see [`is_longer`].
 fn of_length(slides: &[Vec<CutSlide>], n: usize) -> Vec<Vec<MeasuredSlide>> {
     let cut = |slide: &CutSlide| {
         let mut cut = slide.whole.clone();

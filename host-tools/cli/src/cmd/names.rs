@@ -32,12 +32,13 @@ pub(crate) fn find<'n>(wanted: &str, known: &[&'n str]) -> Result<&'n str, Strin
         .ok_or_else(|| unknown(wanted, known.iter().copied()))
 }
 
-/// The name that differs least, if it differs by a slip: a third of its letters at most, or by words that were left out.
+/// The name that differs least, if it differs by a slip: a third of its letters at most, or by words that were left
+/// out.
 pub(crate) fn nearest<'n>(wanted: &str, known: &[&'n str]) -> Option<&'n str> {
     let wanted = wanted.to_lowercase();
     let slips = known
         .iter()
-        .map(|name| (distance(&wanted, &name.to_lowercase()), *name))
+        .map(|name| (strsim::levenshtein(&wanted, &name.to_lowercase()), *name))
         .filter(|(slips, name)| slips * 3 <= name.chars().count())
         .min_by_key(|(slips, _)| *slips);
     let part = || {
@@ -48,22 +49,6 @@ pub(crate) fn nearest<'n>(wanted: &str, known: &[&'n str]) -> Option<&'n str> {
         holding.next().filter(|_| holding.next().is_none()).copied()
     };
     slips.map(|(_, name)| name).or_else(part)
-}
-
-/// Letters to insert, to remove or to replace (Levenshtein 1966).
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, a) in a.chars().enumerate() {
-        let mut diagonal = i;
-        row[0] = i + 1;
-        for (j, b) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(a != *b);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]

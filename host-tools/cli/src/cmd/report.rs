@@ -78,7 +78,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 }
 
 fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    if args.recordings.len() > 1 || args.plot.is_asked() {
+    if args.recordings.len() > 1 || args.plot.plot.is_some() {
         let say = "with a table, give --recordings once and no --plot";
         return Err(UsageError(say.to_owned()).into());
     }

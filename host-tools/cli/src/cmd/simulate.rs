@@ -37,7 +37,8 @@ pub(crate) struct Args {
     finger: FingerName,
 }
 
-/// Records a collection into a folder, or what an interrupted command has not come to. Gives the number of slides that are there then.
+/// Records a collection into a folder, or what an interrupted command has not come to. Gives the number of slides that
+/// are there then.
 pub(crate) fn record(
     collection: &Collection,
     folder: &Path,

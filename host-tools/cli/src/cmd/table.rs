@@ -16,7 +16,7 @@ use super::table_file::read_table;
 #[command(after_help = "\
 Examples:
   tactus table factory.tact                   textures, trials, and how far they are apart
-  tactus table factory.tact --plot map.svg    and a map of them")]
+  tactus table factory.tact --plot pictures    and a map of them")]
 pub(crate) struct Args {
     /// The table; "-" reads standard input
     file: PathBuf,
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Format::Json => print_json(&TableSummary::new(table), out)?,
     }
     if let Some(canvas) = canvas {
-        canvas.write("tactus table", &[map::figure(table)?], out)?;
+        canvas.write(&[map::figure(table)?], out)?;
     }
     Ok(())
 }

@@ -56,8 +56,8 @@ pub(crate) struct Args {
     /// Recordings of what is held against it
     #[arg(long, value_name = "DIR", required_unless_present = "simulated")]
     sample: Option<PathBuf>,
-    /// The texture of these recordings, where they have several; what lies under the simulated finger, the reference's unless
-    /// given
+    /// The texture of these recordings, where they have several; what lies under the simulated finger, the reference's
+    /// unless given
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
     /// Slide live on the simulated rig, in place of recordings; the probe has learned the reference and others there

@@ -89,7 +89,7 @@ fn slide_s(text: &str) -> Result<f64, String> {
 
 /// What the display says in the end.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Told {
+enum VerdictKind {
     Sure(&'static str),
     Perhaps(&'static str),
     Unknown,
@@ -131,10 +131,10 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         .map(|(from, to)| (to as f64 - from as f64) * 1e-9);
     let told = told(board.rig().display()).ok_or(RunError::NoVerdict)?;
     let (says, verdict) = match told {
-        Told::Sure(name) if name == truth => (format!("It is {name}."), "Right"),
-        Told::Sure(name) => (format!("It is {name}."), "Wrong"),
-        Told::Perhaps(name) => (format!("{name}?"), "Undecided"),
-        Told::Unknown => ("It is none of those known.".to_owned(), "Wrong"),
+        VerdictKind::Sure(name) if name == truth => (format!("It is {name}."), "Right"),
+        VerdictKind::Sure(name) => (format!("It is {name}."), "Wrong"),
+        VerdictKind::Perhaps(name) => (format!("{name}?"), "Undecided"),
+        VerdictKind::Unknown => ("It is none of those known.".to_owned(), "Wrong"),
     };
     if !text {
         let line = json!({
@@ -247,9 +247,9 @@ impl Heard {
 }
 
 /// The headline of the verdict; `None` where there is none.
-fn told(display: &Display) -> Option<Told> {
+fn told(display: &Display) -> Option<VerdictKind> {
     if display.shows_large("Unknown") {
-        return Some(Told::Unknown);
+        return Some(VerdictKind::Unknown);
     }
     let is_headline = |text: &str| match text.chars().count() {
         0..=ROW => display.shows_large(text),
@@ -262,8 +262,8 @@ fn told(display: &Display) -> Option<Told> {
             .filter(|name| is_headline(&(cut(name, most) + mark)))
             .max_by_key(|name| name.len())
     };
-    let perhaps = shown(PERHAPS, "?").map(Told::Perhaps);
-    perhaps.or_else(|| shown(HEADLINE, "").map(Told::Sure))
+    let perhaps = shown(PERHAPS, "?").map(VerdictKind::Perhaps);
+    perhaps.or_else(|| shown(HEADLINE, "").map(VerdictKind::Sure))
 }
 
 /// As the display cuts a text: two points in place of what is missing.

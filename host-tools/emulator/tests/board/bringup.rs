@@ -414,7 +414,7 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
     std::fs::create_dir_all(&folder).unwrap();
     let mut journal = Journal::open(&folder.join("journal.jsonl")).unwrap();
     for step in STEPS.iter().take(from) {
-        let found = Finding::default().into();
+        let found = Finding::default();
         journal
             .add(Entry::new(step, NOW.to_owned(), &found))
             .unwrap();

@@ -92,9 +92,9 @@ fn an_answer_over_the_link_is_stored_or_not() {
     let last = writes.len() - 1;
     let erase = |(_, write): &(usize, &FlashWrite)| matches!(write, FlashWrite::Erase { .. });
     let erases = writes.iter().enumerate().filter(erase).map(|(at, _)| at);
-    let places = (0..4)
-        .map(|n| n * (last - 6) / 3)
-        .chain(last - 3..=last + 1);
+    let places = (0..3)
+        .map(|n| n * (last - 6) / 2)
+        .chain(last - 1..=last + 1);
     let (mut left_old, mut left_new) = (0, 0);
     for (n, at) in places.chain(erases).enumerate() {
         let cut = Cut {

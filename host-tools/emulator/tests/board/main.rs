@@ -19,7 +19,6 @@ mod handheld_link;
 mod long_table;
 mod motion;
 mod referee;
-mod selftest;
 mod serve;
 mod settings;
 mod silicon;

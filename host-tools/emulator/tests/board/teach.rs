@@ -18,6 +18,7 @@ use crate::common::{boot, elf};
 const NEW: u8 = 31;
 /// One that it has.
 const OLD: u8 = 47;
+
 /// A simulated world of eight textures without [`NEW`].
 fn world() -> &'static (Collection, FirmwareData) {
     static WORLD: OnceLock<(Collection, FirmwareData)> = OnceLock::new();

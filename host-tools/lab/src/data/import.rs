@@ -40,6 +40,7 @@ const ROW_RATE_HZ: u32 = 100;
 /// Longest slide that is imported, in rows: a minute. The publisher's last six seconds.
 const MAX_ROWS: usize = 6000;
 
+/// Counts of an import.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Imported {
     /// Number of textures.

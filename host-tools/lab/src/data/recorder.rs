@@ -17,8 +17,10 @@ const LIVE_HZ: u32 = 20;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
+    /// A report was lost on the line.
     #[error("block {0} of its samples is missing")]
     MissingBlock(u16),
+    /// No samples came.
     #[error("its samples did not come")]
     NoSamples,
 }

@@ -1,7 +1,7 @@
 //! Virtual explorations without a threshold: the belief after each slide, from which the verdict at any threshold
 //! follows.
 
-use tactus_core::explorer::{Config, Told};
+use tactus_core::explorer::{Config, VerdictKind};
 
 use crate::eval::evaluate::{EvaluateError, evaluate_by, play_with};
 use crate::eval::experiment::Experiment;
@@ -31,7 +31,7 @@ pub struct Course {
 impl Course {
     /// The verdict at this threshold, the slides until then, and the most probable texture. The choice of movements
     /// does not depend on the threshold, so the run at one is the beginning of the run at a higher one.
-    pub fn told(&self, threshold: f32) -> (Told, usize, usize) {
+    pub fn told(&self, threshold: f32) -> (VerdictKind, usize, usize) {
         let is_sure = |b: &Belief| b.probability > threshold && !b.rather_new && !b.is_changed;
         // that takes two slides: see `Explorer::verdict`
         let is_changed = |at, b: &Belief| at > 0 && b.probability > threshold && b.is_changed;
@@ -40,10 +40,10 @@ impl Course {
         let at = over.unwrap_or(self.beliefs.len().saturating_sub(1));
         let last = self.beliefs.get(at);
         let told = match last {
-            Some(b) if over.is_some() && is_sure(b) => Told::Sure,
-            Some(b) if b.is_new => Told::New,
-            Some(b) if b.is_changed => Told::Changed,
-            _ => Told::Undecided,
+            Some(b) if over.is_some() && is_sure(b) => VerdictKind::Sure,
+            Some(b) if b.is_new => VerdictKind::New,
+            Some(b) if b.is_changed => VerdictKind::Changed,
+            _ => VerdictKind::Undecided,
         };
         (
             told,
@@ -65,29 +65,23 @@ pub fn courses(
         threshold: 1.0,
         ..config
     };
-    evaluate_by(
-        experiment,
-        config,
-        runs,
-        done,
-        |explorer, confusions, run| {
-            let mut beliefs = Vec::new();
-            let outcome = play_with(explorer, confusions, config.strategy, run, |_, explorer| {
-                let best = explorer.best();
-                beliefs.push(Belief {
-                    texture: best.texture.into(),
-                    probability: best.probability,
-                    rather_new: config.open && best.log_odds.is_some_and(|odds| odds > 0.0),
-                    is_new: best.unknown,
-                    is_changed: best.changed,
-                });
+    evaluate_by(experiment, config, runs, done, |explorer, run| {
+        let mut beliefs = Vec::new();
+        let outcome = play_with(explorer, config.strategy, run, |_, explorer| {
+            let best = explorer.best();
+            beliefs.push(Belief {
+                texture: best.texture.into(),
+                probability: best.probability,
+                rather_new: config.open && best.log_odds.is_some_and(|odds| odds > 0.0),
+                is_new: best.unknown,
+                is_changed: best.changed,
             });
-            Course {
-                presented: outcome.unknown,
-                beliefs,
-            }
-        },
-    )
+        });
+        Course {
+            presented: outcome.unknown,
+            beliefs,
+        }
+    })
 }
 
 #[cfg(test)]

@@ -5,9 +5,7 @@ use std::collections::HashMap;
 use rand::Rng as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{
-    self, Config, Confusions, Degrees, Explorer, ExplorerError, Strategy, Told,
-};
+use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy, VerdictKind};
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
 use tactus_core::table::{Action, Table, TableError};
@@ -82,7 +80,7 @@ pub struct Outcome {
     /// True if the threshold was exceeded.
     pub sure: bool,
     /// The verdict.
-    pub told: Told,
+    pub told: VerdictKind,
     /// Slides made.
     pub slides: u8,
     /// True if it would have been called unknown, had that been an answer.
@@ -91,7 +89,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// The verdict, and true if the most probable texture is the right one.
-    pub fn told(&self) -> (Told, bool) {
+    pub fn told(&self) -> (VerdictKind, bool) {
         (self.told, self.identified == self.unknown)
     }
 }
@@ -110,50 +108,18 @@ pub enum EvaluateError {
     Explorer(#[from] ExplorerError),
 }
 
-/// Most memory for degrees of confusion that are kept, bytes.
-const MAX_KEPT: usize = 256 << 20;
-
-/// The data that all runs with the same table share.
-#[derive(Clone, Debug)]
-pub struct Shared<'b> {
-    /// The explorer before its first slide.
-    pub explorer: Box<Explorer<'b, MAX_TEXTURES>>,
-    /// Kept if they are needed at every step, and there is memory for them.
-    pub confusions: Option<Confusions<Vec<Degrees>>>,
-}
-
-impl<'b> Shared<'b> {
-    /// The data of an explorer with this strategy.
-    pub fn new(explorer: Box<Explorer<'b, MAX_TEXTURES>>, strategy: Strategy) -> Self {
-        let buffer = Confusions::<Vec<_>>::len_for(&explorer);
-        let keep = strategy == Strategy::Bayesian && buffer <= MAX_KEPT / size_of::<Degrees>();
-        let kept = || Confusions::new(&explorer, vec![Degrees::default(); buffer]);
-        Self {
-            confusions: keep.then(kept).flatten(),
-            explorer,
-        }
-    }
-
-    fn with(bytes: &'b [u8], of: &Experiment, config: Config) -> Result<Self, EvaluateError> {
-        let explorer = explorer(bytes, of.measured(), config, of.candidates())?;
-        Ok(Self::new(explorer, config.strategy))
-    }
-}
-
-/// Plays one run to its end, with the degrees of confusion of [`Shared`] or computing them at each use.
+/// Plays one run to its end.
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
-    confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
     run: Run<'_>,
 ) -> Outcome {
-    play_with(explorer, confusions, strategy, run, |_, _| ())
+    play_with(explorer, strategy, run, |_, _| ())
 }
 
 /// As [`play`]; `each` gets every action and the explorer after it.
-pub fn play_with<const N: usize>(
+pub(crate) fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
-    confusions: Option<&Confusions<Vec<Degrees>>>,
     strategy: Strategy,
     mut run: Run<'_>,
     mut each: impl FnMut(Action, &Explorer<'_, N>),
@@ -165,13 +131,8 @@ pub fn play_with<const N: usize>(
             break verdict;
         }
         // only Bayesian exploration looks ahead
-        let expected = match (strategy, confusions) {
-            (Strategy::Bayesian, Some(confusions)) => {
-                #[cfg(test)]
-                tests::KEPT.set(tests::KEPT.get() + 1);
-                explorer.expected_outcomes_by(confusions)
-            }
-            (Strategy::Bayesian, None) => explorer.expected_outcomes(),
+        let expected = match strategy {
+            Strategy::Bayesian => explorer.expected_outcomes(),
             _ => Default::default(),
         };
         let action = explorer.choose(&expected, run.random.next_u32());
@@ -194,7 +155,7 @@ pub fn play_with<const N: usize>(
         unknown: run.unknown,
         identified: verdict.texture.into(),
         sure: verdict.sure,
-        told: verdict.told(),
+        told: verdict.kind(),
         slides: explorer.slides(),
         unknown_like: explorer.is_unknown(),
     }
@@ -208,13 +169,9 @@ pub fn evaluate(
     runs: u64,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Outcome>, EvaluateError> {
-    evaluate_by(
-        experiment,
-        config,
-        runs,
-        done,
-        |explorer, confusions, run| play(explorer, confusions, config.strategy, run),
-    )
+    evaluate_by(experiment, config, runs, done, |explorer, run| {
+        play(explorer, config.strategy, run)
+    })
 }
 
 /// Plays `runs` runs on all cores, each by `play`: see [`evaluate`].
@@ -223,39 +180,45 @@ pub(super) fn evaluate_by<T: Send>(
     config: Config,
     runs: u64,
     done: impl Fn() + Sync,
-    play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Kept<'_>, Run<'_>) -> T + Sync,
+    play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Run<'_>) -> T + Sync,
 ) -> Result<Vec<T>, EvaluateError> {
     let learn = |run| experiment.run(run).learn(config.method);
-    let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, kept: Kept<'_>, index| {
-        let outcome = play(explorer, kept, experiment.run(index));
+    let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, index| {
+        let outcome = play(explorer, experiment.run(index));
         done();
         outcome
     };
     // where every run learns from the same slides, one table serves all
     if experiment.is_fixed() {
         let bytes = learn(0)?;
-        let shared = Shared::with(&bytes, experiment, config)?;
-        let run = |explorer: &mut Box<_>, index| run(explorer, shared.confusions.as_ref(), index);
+        let explorer = explorer(
+            &bytes,
+            experiment.measured(),
+            config,
+            experiment.candidates(),
+        )?;
+        let run = |explorer: &mut Box<_>, index| run(explorer, index);
         let all = (0..runs).into_par_iter().panic_fuse();
-        return Ok(all.map_init(|| shared.explorer.clone(), run).collect());
+        return Ok(all.map_init(|| explorer.clone(), run).collect());
     }
     let round = experiment.round();
     let rounds = (0..runs.div_ceil(round)).into_par_iter().panic_fuse();
     let played = rounds.map(|number| {
         let first = number * round;
         let bytes = learn(first)?;
-        let mut shared = Shared::with(&bytes, experiment, config)?;
-        let kept = shared.confusions.as_ref();
+        let mut explorer = explorer(
+            &bytes,
+            experiment.measured(),
+            config,
+            experiment.candidates(),
+        )?;
         let runs = first..runs.min(first + round);
-        let played = runs.map(|index| run(&mut shared.explorer, kept, index));
+        let played = runs.map(|index| run(&mut explorer, index));
         Ok(played.collect())
     });
     let played: Result<Vec<Vec<T>>, EvaluateError> = played.collect();
     Ok(played?.into_iter().flatten().collect())
 }
-
-/// Degrees of confusion, where they are kept.
-pub(super) type Kept<'k> = Option<&'k Confusions<Vec<Degrees>>>;
 
 /// An explorer on the heap: it is large, and the threads' stacks are not. Without `candidates`, all textures are.
 /// Errors: the table does not read, or cannot be explored.
@@ -368,70 +331,7 @@ impl Summary {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::Cell;
-
     use super::*;
-    use crate::data::properties::PropertyTable;
-
-    thread_local! {
-        /// Steps of this thread that took degrees of confusion that were kept.
-        pub(super) static KEPT: Cell<u64> = const { Cell::new(0) };
-    }
-
-    /// Thirty textures in the plane of roughness and fineness, their neighbours much alike.
-    fn experiment() -> Experiment {
-        let slide = |texture: u16, trial: u16| {
-            let [column, row, trial] = [texture % 6, texture / 6, trial].map(f32::from);
-            let off = (column + 2.0 * row + 3.0 * trial) % 5.0 - 2.0;
-            [
-                1.0,
-                4.0 + 0.3 * column + 0.1 * off,
-                2.0 + 0.3 * row - 0.1 * off,
-            ]
-        };
-        let slides = |trials: std::ops::Range<u16>| -> Vec<Vec<_>> {
-            let texture = |t| vec![trials.clone().map(|trial| slide(t, trial)).collect()];
-            (0..30).map(texture).collect()
-        };
-        let table = PropertyTable {
-            textures: (0..30).map(|t| t.to_string()).collect(),
-            movements: vec!["only".to_owned()],
-            train: slides(0..4),
-            validate: slides(4..9),
-        };
-        Experiment::given(&table, None, 1).unwrap()
-    }
-
-    #[test]
-    fn runs_with_one_table_share_its_degrees_of_confusion() {
-        let experiment = experiment();
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
-        let pool = pool.build().unwrap();
-        for (strategy, keeps) in [
-            (Strategy::Bayesian, true),
-            (Strategy::Cycling, false),
-            (Strategy::Random, false),
-        ] {
-            let config = Config {
-                strategy,
-                ..Config::default()
-            };
-            let all = || {
-                let before = KEPT.get();
-                let outcomes = evaluate(&experiment, config, 100, || ()).unwrap();
-                (outcomes, KEPT.get() - before)
-            };
-            let (outcomes, kept) = pool.install(all);
-            let steps = outcomes.iter().map(|o| u64::from(o.slides)).sum::<u64>();
-            assert!(steps > 200, "{steps}");
-            assert_eq!(kept, if keeps { steps } else { 0 });
-            // as without
-            let bytes = experiment.run(0).learn(config.method).unwrap();
-            let mut explorer = explorer(&bytes, experiment.measured(), config, None).unwrap();
-            let computed = (0..100).map(|n| play(&mut explorer, None, strategy, experiment.run(n)));
-            assert!(computed.eq(outcomes));
-        }
-    }
 
     #[test]
     fn summary_counts_as_the_protocols_say() {
@@ -439,7 +339,11 @@ mod tests {
             unknown,
             identified,
             sure,
-            told: if sure { Told::Sure } else { Told::Undecided },
+            told: if sure {
+                VerdictKind::Sure
+            } else {
+                VerdictKind::Undecided
+            },
             slides,
             unknown_like: slides == 4,
         };

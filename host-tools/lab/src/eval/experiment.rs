@@ -324,7 +324,7 @@ impl Experiment {
     /// The same, and no run shows a slide twice: as with [`crate::data::replay::Replay`], a movement without a slide
     /// left is not made.
     #[must_use]
-    pub fn each_slide_once(self) -> Self {
+    pub(crate) fn each_slide_once(self) -> Self {
         Self { once: true, ..self }
     }
 

@@ -8,7 +8,6 @@
 //! moments). The mean's error then has the variance (1 - w)^2 (1/n + t^2) + w^2/k; the table notes as many slides for
 //! the texture as would leave an error as large.
 
-use serde::Serialize;
 use tactus_core::features::{Vector, WHITE_STEPS};
 use tactus_core::table::{Contents, EncodeError, Table, recentre, retell};
 
@@ -25,6 +24,7 @@ pub struct NewSlide {
     pub features: Vec<i16>,
 }
 
+/// A table that was moved by new slides.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Refreshed {
     /// The table.
@@ -38,7 +38,7 @@ pub struct Refreshed {
 }
 
 /// Shift of a texture.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Moved {
     /// Its name.
     pub texture: String,
@@ -47,7 +47,7 @@ pub struct Moved {
 }
 
 /// Two textures that ten slides do not separate.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Pair {
     /// The one.
     pub first: String,

@@ -24,7 +24,7 @@ pub struct Statements {
 
 /// Share of right names by the stated probability of the most probable texture. Slides of one exploration are not
 /// independent.
-pub fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
+pub(crate) fn statements(courses: &[Course], threshold: f32) -> Vec<Statements> {
     let upper = SAID.iter().skip(1).copied().chain([1.0]);
     let mut bins: Vec<(Statements, f64)> = SAID
         .iter()

@@ -8,7 +8,7 @@ use tactus_core::table::{Contents, Table};
 
 use crate::data::replay::MeasuredSlide;
 use crate::eval::alike::{Alike, alike, nearest};
-use crate::eval::evaluate::{EvaluateError, Method, Shared, explorer, play};
+use crate::eval::evaluate::{EvaluateError, Method, explorer, play};
 use crate::eval::experiment::Experiment;
 use crate::eval::samples;
 use crate::eval::show::count;
@@ -40,6 +40,7 @@ pub struct Report {
     pub advice: Vec<String>,
 }
 
+/// A texture of the table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TextureReport {
     /// Its name.
@@ -187,14 +188,13 @@ impl Report {
             set.and(s.measurement.properties.measured())
         });
         let explorer = explorer(table.as_bytes(), measured, config, None)?;
-        let shared = Shared::new(explorer, config.strategy);
         let outcomes: Vec<_> = (0..RUNS * whole.len() as u64)
             .into_par_iter()
             .map_init(
-                || shared.explorer.clone(),
+                || explorer.clone(),
                 |explorer, run| {
                     let run = experiment.run(run);
-                    let outcome = play(explorer, shared.confusions.as_ref(), config.strategy, run);
+                    let outcome = play(explorer, config.strategy, run);
                     done();
                     outcome
                 },

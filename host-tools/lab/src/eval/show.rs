@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
-use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
+use tactus_core::explorer::{ExpectedOutcome, Verdict, VerdictKind};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
@@ -275,8 +275,8 @@ impl<'t, W: Write> Show<'t, W> {
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;
         let slides = count(slides, "slide");
-        match verdict.told() {
-            Told::New => {
+        match verdict.kind() {
+            VerdictKind::New => {
                 let odds = verdict
                     .log_odds
                     .map_or(String::new(), |odds| format!(" (log-odds {odds:+.1})"));
@@ -286,13 +286,15 @@ impl<'t, W: Write> Show<'t, W> {
                     count(self.table.textures(), "texture")
                 )
             }
-            Told::Changed => writeln!(
+            VerdictKind::Changed => writeln!(
                 self.out,
                 "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like \
                  it."
             ),
-            Told::Sure => writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}."),
-            Told::Undecided => writeln!(
+            VerdictKind::Sure => {
+                writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")
+            }
+            VerdictKind::Undecided => writeln!(
                 self.out,
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
             ),
@@ -302,12 +304,12 @@ impl<'t, W: Write> Show<'t, W> {
 
 /// Returns true if a verdict is right about the texture of this name; `None` if it is undecided.
 pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
-    match verdict.told() {
-        Told::Sure => Some(table.name(verdict.texture) == Some(truth)),
-        Told::New => Some(table.find(truth).is_none()),
+    match verdict.kind() {
+        VerdictKind::Sure => Some(table.name(verdict.texture) == Some(truth)),
+        VerdictKind::New => Some(table.find(truth).is_none()),
         // for another texture it is no wrong answer: the verdict is that the texture is not as learned
-        Told::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
-        Told::Undecided => None,
+        VerdictKind::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
+        VerdictKind::Undecided => None,
     }
 }
 

@@ -32,6 +32,7 @@ pub struct TableSummary {
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
+/// A movement of the table.
 pub struct MovementSummary {
     force_n: f32,
     speed_mm_s: f32,

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use serde::Serialize;
-use tactus_core::explorer::{ExpectedOutcome, Told, Verdict};
+use tactus_core::explorer::{ExpectedOutcome, Verdict, VerdictKind};
 use tactus_core::features::{Properties, Property};
 use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Table};
@@ -69,11 +69,11 @@ impl Answer {
     /// A verdict in words for programs.
     pub fn new(verdict: Verdict, slides: u8, table: Table<'_>) -> Self {
         Self {
-            told: match verdict.told() {
-                Told::Sure => "sure",
-                Told::New => "new",
-                Told::Changed => "changed",
-                Told::Undecided => "undecided",
+            told: match verdict.kind() {
+                VerdictKind::Sure => "sure",
+                VerdictKind::New => "new",
+                VerdictKind::Changed => "changed",
+                VerdictKind::Undecided => "undecided",
             },
             texture: table.name(verdict.texture).unwrap_or_default().to_owned(),
             probability: verdict.probability,

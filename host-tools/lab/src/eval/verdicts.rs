@@ -1,7 +1,7 @@
 //! The verdicts of explorations, and their shares.
 
 use serde::{Deserialize, Serialize};
-use tactus_core::explorer::Told;
+use tactus_core::explorer::VerdictKind;
 
 /// Shares of explorations, 0 to 1; they add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
@@ -23,20 +23,20 @@ pub struct Verdicts {
 
 impl Verdicts {
     /// Counts the verdict of each exploration, with true if the most probable texture was the right one.
-    pub fn of(told: impl IntoIterator<Item = (Told, bool)>) -> Self {
+    pub fn of(told: impl IntoIterator<Item = (VerdictKind, bool)>) -> Self {
         let mut counts = Self::default();
         let (mut all, mut named) = (0.0_f64, 0.0_f64);
         for (told, is_right) in told {
             all += 1.0;
-            if told == Told::Changed && is_right {
+            if told == VerdictKind::Changed && is_right {
                 named += 1.0;
             }
             *match told {
-                Told::Sure if is_right => &mut counts.right,
-                Told::Sure => &mut counts.wrong,
-                Told::Changed => &mut counts.changed,
-                Told::New => &mut counts.new,
-                Told::Undecided => &mut counts.undecided,
+                VerdictKind::Sure if is_right => &mut counts.right,
+                VerdictKind::Sure => &mut counts.wrong,
+                VerdictKind::Changed => &mut counts.changed,
+                VerdictKind::New => &mut counts.new,
+                VerdictKind::Undecided => &mut counts.undecided,
             } += 1.0;
         }
         let share = |count: f64| count / all.max(1.0);
@@ -51,7 +51,7 @@ impl Verdicts {
     }
 
     /// The same of textures that the table does not have: no name is right.
-    pub(crate) fn of_unknown(told: impl IntoIterator<Item = Told>) -> Self {
+    pub(crate) fn of_unknown(told: impl IntoIterator<Item = VerdictKind>) -> Self {
         Self {
             changed_right: None,
             ..Self::of(told.into_iter().map(|told| (told, false)))
@@ -66,14 +66,14 @@ mod tests {
     #[test]
     fn only_a_name_told_as_sure_is_right_or_wrong() {
         let told = [
-            (Told::Sure, true),
-            (Told::Sure, true),
-            (Told::Sure, false),
-            (Told::New, true),
-            (Told::New, false),
-            (Told::Undecided, true),
-            (Told::Changed, true),
-            (Told::Changed, false),
+            (VerdictKind::Sure, true),
+            (VerdictKind::Sure, true),
+            (VerdictKind::Sure, false),
+            (VerdictKind::New, true),
+            (VerdictKind::New, false),
+            (VerdictKind::Undecided, true),
+            (VerdictKind::Changed, true),
+            (VerdictKind::Changed, false),
         ];
         let expected = Verdicts {
             right: 0.25,

@@ -249,6 +249,7 @@ fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     (equal, at_limits.into_iter().map(at).collect())
 }
 
+/// Reasons why a texture cannot be put into a table.
 #[derive(Debug, thiserror::Error)]
 pub enum PutError {
     /// The table compares the paper's properties.
@@ -262,6 +263,7 @@ pub enum PutError {
          table"
     )]
     NothingInCommon,
+    /// The table cannot be written.
     #[error("the reference does not fit into the table")]
     Encode(#[from] EncodeError),
 }

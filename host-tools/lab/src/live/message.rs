@@ -34,9 +34,7 @@ pub(crate) enum Request {
     /// The next part of the work until the probe is there: [`Reply::Preparing`], in the end [`Reply::Ready`].
     Prepare,
     Identify {
-        /// Its number in Table 1.
         texture: u8,
-        /// Seed of the places on the sample where slides begin.
         seed: u32,
         threshold: f32,
         /// Share of the known textures that may be taken for new ones; the table's own, unless given.
@@ -45,9 +43,7 @@ pub(crate) enum Request {
         max_slides: u8,
     },
     Move {
-        /// Its number in Table 1.
         texture: u8,
-        /// Seed of the place on the sample where the slide begins.
         seed: u32,
         force_n: f32,
         speed_mm_s: f32,
@@ -88,24 +84,19 @@ pub(crate) enum Reply {
     },
 }
 
-/// The probe's textures and movements.
 #[derive(Clone, PartialEq, Debug, Serialize, Default)]
 pub(crate) struct KnownTable {
-    /// Names of its textures, in the order of the table.
     pub(crate) textures: Vec<String>,
     /// Their numbers in Table 1; `None` for one that was taught under another name.
     pub(crate) numbers: Vec<Option<u8>>,
-    /// The movements: force, N, and speed, mm/s.
     pub(crate) movements: Vec<(f32, f32)>,
     pub(crate) lengths_ms: Vec<u16>,
     /// Per movement, the place of each texture in a plane; in standard deviations between slides of one texture.
     pub(crate) maps: Vec<Vec<(f64, f64)>>,
     pub(crate) bytes: usize,
-    /// Its CRC-32.
     pub(crate) crc: u32,
 }
 
-/// A moment of the probe, with the events since the last one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(crate) struct Frame {
     pub(crate) at_ms: u64,
@@ -114,12 +105,10 @@ pub(crate) struct Frame {
     /// Height of the undeformed fingertip over the steel plate, mm.
     pub(crate) tip_mm: f64,
     pub(crate) indentation_mm: f64,
-    /// Place of the stage, mm from its lower hard stop.
     pub(crate) stage_mm: f64,
     pub(crate) speed_mm_s: f64,
     pub(crate) force_n: f64,
     pub(crate) shear_n: f64,
-    /// Number in Table 1 of the texture under the finger.
     pub(crate) texture: u8,
     /// Wear of the skin, 0 to 1.
     pub(crate) wear: f64,
@@ -129,7 +118,6 @@ pub(crate) struct Frame {
     pub(crate) pdc: Vec<u16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
     pub(crate) spectra: Vec<Vec<i8>>,
-    /// The probe's events.
     pub(crate) happened: Vec<Happening>,
 }
 
@@ -138,12 +126,10 @@ pub(crate) struct Frame {
 #[allow(clippy::large_enum_variant)] // a few at a time
 pub(crate) enum Happening {
     Chosen {
-        /// Number of the slide, from 1.
         slide: u8,
         movement: u8,
         /// The one property that is looked at; `None` for all features.
         property: Option<&'static str>,
-        /// Expected results of the best actions, best first.
         expected: Vec<Expected>,
     },
     Look {
@@ -153,7 +139,6 @@ pub(crate) enum Happening {
         place: Option<(f64, f64)>,
     },
     Slide {
-        /// Number of the slide, from 1.
         slide: u8,
         movement: u8,
         early_ms: Option<u16>,
@@ -162,7 +147,6 @@ pub(crate) enum Happening {
         place: Option<(f64, f64)>,
     },
     Moved {
-        /// Of the movement, where the table has it.
         movement: Option<u8>,
         measured: Measured,
         place: Option<(f64, f64)>,
@@ -174,7 +158,6 @@ pub(crate) enum Happening {
     Verdict {
         #[serde(flatten)]
         answer: Answer,
-        /// Index of the texture in the table.
         index: u16,
         wants_label: bool,
     },
@@ -184,20 +167,15 @@ pub(crate) enum Happening {
         known: KnownTable,
     },
     Judged {
-        /// Number of the slide, from 1.
         slide: u32,
-        /// `same`, `different` or `unsure`.
         answer: &'static str,
         said: String,
     },
     Verified {
-        /// `same`, `different` or `unsure`.
         answer: &'static str,
-        /// The answer in words, and its error rates.
         said: String,
     },
     Refused {
-        /// The reason, and a remedy.
         why: String,
     },
     Done,
@@ -234,9 +212,7 @@ pub(crate) struct Measured {
     pub(crate) force_n: f32,
     pub(crate) speed_mm_s: f32,
     pub(crate) traction_n: Option<f32>,
-    /// A logarithm.
     pub(crate) roughness_ln: Option<f32>,
-    /// A logarithm.
     pub(crate) fineness_ln: Option<f32>,
     pub(crate) bands_ln: Vec<f32>,
 }

@@ -25,14 +25,11 @@ pub(crate) struct Received {
     pub(crate) pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
     pub(crate) spectra: Vec<Vec<i8>>,
-    /// The probe's events.
     pub(crate) happened: Vec<Happening>,
 }
 
-/// Follows a probe's messages.
 #[derive(Default)]
 pub(crate) struct ProbeMonitor {
-    /// The table in force, and its maps.
     table: Rc<[u8]>,
     planes: Vec<Plane>,
     known: KnownTable,
@@ -43,7 +40,6 @@ pub(crate) struct ProbeMonitor {
 }
 
 impl ProbeMonitor {
-    /// An exploration begins.
     pub(crate) fn explores(&mut self, config: Config) {
         self.followed = Followed::begin(config);
     }
@@ -78,7 +74,6 @@ impl ProbeMonitor {
         };
     }
 
-    /// The probe's textures and movements.
     pub(crate) fn known(&self) -> &KnownTable {
         &self.known
     }

@@ -15,16 +15,13 @@ use tactus_world::world::Truth;
 
 const PDC_MS: u64 = 10;
 
-/// The work in progress, and the events since the last frame.
 pub(super) struct Scene {
     /// The time at which it stands still; `None`: it does not.
     pub(super) until: Option<Duration>,
     pub(super) waits: Cell<bool>,
-    /// Changes of the rig before its next millisecond.
     texture: Option<u8>,
     pub(super) wear: Option<f64>,
     pub(super) stop: bool,
-    /// The probe's messages.
     pub(super) monitor: ProbeMonitor,
     now: Duration,
     phase: Phase,

@@ -272,7 +272,6 @@ impl Running {
         Ok(Reply::Frame(self.scene.borrow_mut().frame()))
     }
 
-    /// So much time passes, at most.
     fn go_on(&mut self, ms: u32) {
         {
             let mut scene = self.scene.borrow_mut();

@@ -18,7 +18,6 @@ pub(crate) const TRIALS: u32 = 5;
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Trials {
-    /// Its number in Table 1.
     pub(crate) texture: u8,
     /// Per movement of [`Collection::MOVEMENTS`].
     pub(crate) movements: Vec<Vec<ObservedTrial>>,

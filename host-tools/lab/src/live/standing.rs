@@ -9,10 +9,8 @@ use tactus_core::features::{Block, Movement, Observation, PropertySet, Slide};
 use tactus_core::sensor::pressure::samples_in;
 use tactus_core::table::{Action, MAX_TEXTURES, Table};
 
-/// Coefficients and angles, for all slides.
 pub(super) static PLAN: LazyLock<Plan> = LazyLock::new(Plan::new);
 
-/// The posterior, with the checks for new and changed textures.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(crate) struct Standing {
     pub(crate) posterior: Vec<f32>,
@@ -46,7 +44,6 @@ pub(super) struct Followed {
 }
 
 impl Followed {
-    /// A new exploration.
     pub(super) fn begin(config: Config) -> Self {
         Self {
             config,
@@ -86,7 +83,6 @@ impl Followed {
         self.standing(table, Some((self.action?, self.reached as u8, seen)))
     }
 
-    /// The slide has ended; returns the posterior.
     pub(super) fn observed(
         &mut self,
         table: Table<'_>,

@@ -92,7 +92,6 @@ pub(super) enum Reply {
     Error { why: String },
 }
 
-/// A moment, and what has been since the last one.
 #[derive(Serialize)]
 pub(super) struct Frame {
     pub(super) send: Vec<u8>,

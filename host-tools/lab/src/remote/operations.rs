@@ -3,7 +3,7 @@
 
 use std::io::{self, Write as _};
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use tactus_core::explorer::{Strategy, Verdict};
 use tactus_core::table::{Contents, Table};
 use tactus_core::wire::{Command, Event, Identify, Report, Status};
@@ -13,7 +13,7 @@ use super::verifying::{Verifying, config_of};
 use crate::data::recorder::{RecordError, Recorder};
 use crate::data::recording::{Labels, Recording};
 use crate::eval::alike::{self, Alike};
-use crate::eval::refresh::{Moved, NewSlide, Pair, Refreshed, refresh as moved_table};
+use crate::eval::refresh::{NewSlide, Refreshed, refresh as moved_table};
 use crate::eval::samples::Trials;
 use crate::eval::show::Show;
 use crate::eval::verified::{Verified, print_answer, print_slide};
@@ -194,25 +194,8 @@ pub async fn record(probe: &Probe, wanted: &Wanted) -> Result<Recorded> {
     })
 }
 
-/// The table of a probe after its skin or finger was replaced.
-#[derive(Debug, Serialize)]
-pub struct RefreshedProbe {
-    /// Slides that it goes by.
-    pub slides: usize,
-    /// The way of all textures together, standard deviations of a slide.
-    pub together: f64,
-    /// The way of each beyond that.
-    pub moved: Vec<Moved>,
-    /// Textures without a new slide.
-    pub left_out: Vec<String>,
-    /// Pairs that cannot be told apart now.
-    pub alike: Vec<Pair>,
-    /// Checksum of the table in use; CRC-32, hexadecimal.
-    pub checksum: String,
-}
-
 /// Has the probe slide over every texture once at each movement, and moves its table, with somebody's consent.
-pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedProbe> {
+pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<()> {
     let bytes = probe.table().await?;
     let table = Table::read(&bytes)?;
     if !matches!(table.contents(), Contents::Fused(..)) {
@@ -229,25 +212,11 @@ pub async fn refresh(probe: &Probe, seed: impl Fn() -> u32) -> Result<RefreshedP
         writeln!(words, "{name}: {}", count(made.len() as u64, "slide"))?;
         slides.extend(made);
     }
-    let Refreshed {
-        bytes: new,
-        together,
-        moved,
-        alike,
-    } = moved_table(table, &slides).map_err(OperationError::said)?;
-    let mut refreshed = RefreshedProbe {
-        slides: slides.len(),
-        together,
-        moved,
-        left_out,
-        alike,
-        checksum: String::new(),
-    };
-    refreshed.print(&mut words)?;
+    let refreshed = moved_table(table, &slides).map_err(OperationError::said)?;
+    print_refreshed(&refreshed, &left_out, &mut words)?;
     let lost = "The probe is to use the table that has moved.";
-    let status = operations::replace_table(probe, &new, lost, "refresh again").await?;
-    refreshed.checksum = format!("{:08x}", status.table_crc);
-    Ok(refreshed)
+    operations::replace_table(probe, &refreshed.bytes, lost, "refresh again").await?;
+    Ok(())
 }
 
 async fn slides_of(
@@ -288,29 +257,31 @@ async fn slides_of(
     Ok(made)
 }
 
-impl RefreshedProbe {
-    fn print(&self, out: &mut impl io::Write) -> io::Result<()> {
-        let together = self.together;
+fn print_refreshed(
+    refreshed: &Refreshed,
+    left_out: &[String],
+    out: &mut impl io::Write,
+) -> io::Result<()> {
+    let together = refreshed.together;
+    writeln!(
+        out,
+        "All textures moved together by {together:.1} standard deviations of a slide."
+    )?;
+    let most = refreshed.moved.iter().take(NAMED);
+    let most = most.map(|m| format!("{} ({:.1})", m.texture, m.moved));
+    let most = most.collect::<Vec<_>>().join(", ");
+    writeln!(out, "Beyond that moved most: {most}.")?;
+    if !left_out.is_empty() {
+        let all = left_out.join(", ");
         writeln!(
             out,
-            "All textures moved together by {together:.1} standard deviations of a slide."
+            "Moved with the others only, as they were left out: {all}."
         )?;
-        let most = self.moved.iter().take(NAMED);
-        let most = most.map(|m| format!("{} ({:.1})", m.texture, m.moved));
-        let most = most.collect::<Vec<_>>().join(", ");
-        writeln!(out, "Beyond that moved most: {most}.")?;
-        if !self.left_out.is_empty() {
-            let all = self.left_out.join(", ");
-            writeln!(
-                out,
-                "Moved with the others only, as they were left out: {all}."
-            )?;
-        }
-        for pair in &self.alike {
-            let since = if pair.before { "as before" } else { "any more" };
-            let (first, second) = (&pair.first, &pair.second);
-            writeln!(out, "{first} and {second} cannot be told apart {since}.")?;
-        }
-        Ok(())
     }
+    for pair in &refreshed.alike {
+        let since = if pair.before { "as before" } else { "any more" };
+        let (first, second) = (&pair.first, &pair.second);
+        writeln!(out, "{first} and {second} cannot be told apart {since}.")?;
+    }
+    Ok(())
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use crate::eval::alike::Alike;
 
 /// "Most like Canvas: 31 % of slides could be taken for it"
-pub fn most_like(nearest: &Alike) -> String {
+fn most_like(nearest: &Alike) -> String {
     let other = &nearest.texture;
     match (nearest.taken_for * 100.0).round() {
         share if share < 1.0 => {

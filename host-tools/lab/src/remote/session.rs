@@ -221,7 +221,6 @@ impl Open {
     }
 }
 
-/// Works with a probe for as long as there is a line.
 async fn live(probe: Probe, desk: Rc<RefCell<Desk>>, kept: Rc<RefCell<Kept>>) {
     let greeted = work(&probe, Work::Status, &kept).await;
     desk.borrow_mut().connected = greeted.is_ok();

@@ -77,7 +77,6 @@ impl<'t> Verifying<'t> {
         None
     }
 
-    /// The answer, and what it is worth.
     pub(super) fn end(mut self) -> Verified {
         self.verified.false_accept = false_accept(&self.here, self.texture);
         self.verified

@@ -26,9 +26,8 @@ use tactus_core::wire::{Command, Event, Failure, Identify, Train};
 use self::naming::Naming;
 use super::collection::Collection;
 use super::flash::{RamFlash, SECTOR, TABLE};
-use super::press::FORCE_LIMIT_N;
 use super::probe::{Host, SimProbe, switch_on};
-use super::rig::{SimError, SimRig};
+use super::rig::{FORCE_LIMIT_N, SimError, SimRig};
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;
 
@@ -409,7 +408,9 @@ fn now_ns(probe: &mut SimProbe<'_, HostLog>) -> u64 {
 
 /// Sends the probe a command; returns the reason why it was not done, in its words.
 fn send(probe: &mut SimProbe<'_, HostLog>, command: Command) -> Result<(), String> {
-    block_on(probe.perform(&command)).map_err(|why| why.to_string())
+    block_on(probe.perform(&command))
+        .map(drop)
+        .map_err(|why| why.to_string())
 }
 
 fn ask(probe: &mut SimProbe<'_, HostLog>, case: &Case) -> Result<(), String> {

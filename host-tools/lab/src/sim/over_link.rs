@@ -40,15 +40,7 @@ impl ArmRig {
         world.mount_on(Arm::new(setup.trial_seed));
         let reader = Reader::new(setup.finger);
         let model = reader.model();
-        let calibration = RigCalibration {
-            pressure: model.calibration,
-            unloaded_a: (0.037, 0.0),
-            newton_per_ampere: 16.4,
-            date: 0,
-            air_known: false,
-            turned: 0,
-            serial: [0; 16],
-        };
+        let calibration = RigCalibration::unmeasured(model);
         let mut began_ns = u64::from(reader.power_up_ms()) * 1_000_000;
         if !reader.start().is_empty() {
             // parts that do not start give no words, and that is noticed

@@ -59,9 +59,10 @@ pub trait Host {
 
 /// A simulated rig that a servo drives: ours, or one that an arm moves.
 pub trait Driven {
-    /// See [`Servo::HAS_STAGE`].
+    /// See [`Servo::has_stage`].
     const HAS_STAGE: bool;
 
+    /// A millisecond passes.
     fn tick(&mut self) -> &Outputs;
 
     /// Takes the end of the last movement; `None` the second time.
@@ -70,12 +71,16 @@ pub trait Driven {
     /// Its state, as a probe shows it.
     fn state(&mut self, ended: Option<Ended>) -> RigState;
 
+    /// Virtual time since power-up.
     fn now(&self) -> Duration;
 
+    /// Gives it a command, which it may refuse.
     fn command(&mut self, command: RigCommand) -> Result<(), Refused>;
 
+    /// Stops the command.
     fn stop(&mut self);
 
+    /// Ends the slide early.
     fn end_slide(&mut self) {}
 
     /// See [`Servo::gravity`].
@@ -155,6 +160,7 @@ impl Driven for ArmRig {
     }
 }
 
+/// The servo of a simulated rig: virtual time passes while a task waits for it.
 pub struct SimServo<'p, H, R = SimRig> {
     rig: R,
     host: &'p RefCell<H>,
@@ -196,7 +202,9 @@ impl<'p, H: Host, R: Driven> SimServo<'p, H, R> {
 }
 
 impl<H: Host, R: Driven> Servo for SimServo<'_, H, R> {
-    const HAS_STAGE: bool = R::HAS_STAGE;
+    fn has_stage(&self) -> bool {
+        R::HAS_STAGE
+    }
 
     async fn command(&mut self, command: RigCommand) -> Result<(), Refused> {
         self.ended = None;
@@ -271,6 +279,7 @@ impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
     }
 }
 
+/// Passes events to the host.
 pub struct HostSink<'p, H>(&'p RefCell<H>);
 
 impl<H: Host> Events for HostSink<'_, H> {

@@ -23,6 +23,8 @@ use tactus_world::conditions::Conditions;
 use tactus_world::slot::Reader;
 use tactus_world::world::{Setup, World};
 
+/// Largest force that the finger ever bears, N.
+pub const FORCE_LIMIT_N: f64 = 2.2;
 const TICK_NS: u64 = 1_000_000;
 const PULSE_NS: u64 = 5_000;
 const DIR_NS: u64 = 2_000;
@@ -113,15 +115,7 @@ impl SimRig {
     fn of(world: World, setup: Setup, unguarded: Unguarded) -> Self {
         let reader = Reader::new(setup.finger);
         let model = reader.model();
-        let calibration = RigCalibration {
-            pressure: model.calibration,
-            unloaded_a: (0.037, 0.0),
-            newton_per_ampere: 16.4,
-            date: 0,
-            air_known: false,
-            turned: 0,
-            serial: [0; 16],
-        };
+        let calibration = RigCalibration::unmeasured(model);
         Self {
             world,
             started: reader.start().is_empty(),

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::result::{Series, StepResult};
+use super::judge::Finding;
 use super::steps::Step;
 
 /// A step that is over.
@@ -23,9 +23,9 @@ pub struct Entry {
     pub saw: String,
     /// What is wrong.
     pub mistakes: Vec<EntryMistake>,
-    /// What can be drawn.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub series: Option<Series>,
+    /// Counts of P_DC and weights, mN, of the force scale.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f64; 2]>,
 }
 
 /// Something that is wrong.
@@ -41,8 +41,8 @@ pub struct EntryMistake {
 
 impl Entry {
     /// What a step found at a time.
-    pub fn new(step: &Step, at: String, found: &StepResult) -> Self {
-        let mistakes = found.finding.named.iter().map(|named| {
+    pub fn new(step: &Step, at: String, found: &Finding) -> Self {
+        let mistakes = found.named.iter().map(|named| {
             let place = match named.place {
                 "" => String::new(),
                 place => format!(" ({place})"),
@@ -56,10 +56,10 @@ impl Entry {
         Self {
             step: step.key.to_owned(),
             at,
-            passed: found.finding.passed(),
-            saw: found.finding.saw.clone(),
+            passed: found.passed(),
+            saw: found.saw.clone(),
             mistakes: mistakes.collect(),
-            series: found.series.clone(),
+            points: found.points.clone(),
         }
     }
 }
@@ -73,9 +73,6 @@ pub struct Journal {
 
 impl Journal {
     /// Opens the journal at a path, or begins it. A last line that a power cut left unfinished is nothing.
-    ///
-    /// # Errors
-    /// It cannot be read or written, or another line of it is no entry.
     pub fn open(path: &Path) -> io::Result<Self> {
         let mut file = OpenOptions::new()
             .read(true)
@@ -110,9 +107,6 @@ impl Journal {
     }
 
     /// Writes an entry, and has the disk keep it.
-    ///
-    /// # Errors
-    /// It cannot be written.
     pub fn add(&mut self, entry: Entry) -> io::Result<()> {
         let mut line = serde_json::to_string(&entry)?;
         line.push('\n');
@@ -134,7 +128,7 @@ mod tests {
             passed,
             saw: "3.30 V".to_owned(),
             mistakes: Vec::new(),
-            series: None,
+            points: Vec::new(),
         }
     }
 

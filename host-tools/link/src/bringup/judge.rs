@@ -14,11 +14,11 @@ use tactus_core::wire::bringup::{
 use super::mistakes::{self as m, Mistake, Named};
 
 /// Supplies, V: from, to.
-pub const LOGIC_V: (f64, f64) = (3.2, 3.4);
+pub(crate) const LOGIC_V: (f64, f64) = (3.2, 3.4);
 /// Of the motors, V.
-pub const MOTOR_V: (f64, f64) = (11.4, 12.6);
+pub(crate) const MOTOR_V: (f64, f64) = (11.4, 12.6);
 /// Of the core, kHz, and how far it may be off by the clock of the same quartz.
-pub const CORE_KHZ: (u32, u32) = (168_000, 16);
+pub(crate) const CORE_KHZ: (u32, u32) = (168_000, 16);
 /// Beyond this from the middle the amplifier is not there, or at its end, counts: 1.1 A.
 const NOT_THERE: f32 = 1400.0;
 /// From one limit switch of the stage to the other, mm: 77, and as far as hands push on to the hard stops.
@@ -26,7 +26,7 @@ pub const TRAVEL_MM: (f64, f64) = (74.0, 88.0);
 /// The encoder, counts a mm.
 pub(super) const COUNTS_PER_MM: f64 = 1000.0;
 /// Way down that is measured with a caliper, mm, and what it may be off.
-pub const LEVER_MM: (f64, f64) = (4.0, 0.2);
+pub(crate) const LEVER_MM: (f64, f64) = (4.0, 0.2);
 /// A driver's other step settings are a factor of 2 off; beyond this a way is one of these and no lost steps.
 const OTHER_SCALE: (f64, f64) = (0.7, 1.4);
 /// See [`WEAK_A`] and [`BRAKING_A`], mA.
@@ -44,13 +44,15 @@ pub struct Finding {
     pub saw: String,
     /// What is wrong; nothing where the step has passed.
     pub named: Vec<Named>,
+    /// Counts of P_DC and weights, mN, of the force scale.
+    pub points: Vec<[f64; 2]>,
 }
 
 impl Finding {
     fn new(saw: String) -> Self {
         Self {
             saw,
-            named: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -201,7 +203,7 @@ pub fn noise(seen: &SensorSeen) -> Finding {
 }
 
 /// The switches in the order in which somebody presses them.
-pub const SWITCHES: [Pin; 4] = [Pin::StageLeft, Pin::StageRight, Pin::LeverTop, Pin::EStop];
+pub(crate) const SWITCHES: [Pin; 4] = [Pin::StageLeft, Pin::StageRight, Pin::LeverTop, Pin::EStop];
 
 fn opens(look: &Look, pin: Pin) -> bool {
     match pin {
@@ -342,8 +344,7 @@ fn ended(ended: Result<(), Stopped>) -> String {
     ended.map_or_else(|why| format!("; stopped: {why}"), |()| String::new())
 }
 
-/// The lever's first millimetre, up or down as it was asked.
-pub fn lever_sense(seen: &LeverSeen, went: Went) -> Finding {
+pub(crate) fn lever_sense(seen: &LeverSeen, went: Went) -> Finding {
     let saw = format!(
         "{} steps down, seen: {went:?}{}",
         seen.steps,
@@ -356,7 +357,7 @@ pub fn lever_sense(seen: &LeverSeen, went: Went) -> Finding {
 }
 
 /// The lever up to its switch, 2 mm down, and up again.
-pub fn lever_switch(up: &LeverSeen, down: &LeverSeen, back: &LeverSeen) -> Finding {
+pub(crate) fn lever_switch(up: &LeverSeen, down: &LeverSeen, back: &LeverSeen) -> Finding {
     let play = (-back.steps - down.steps).abs();
     let saw = format!(
         "{} steps up to its switch, {} down, {} up again{}{}{}",
@@ -382,7 +383,7 @@ pub fn lever_switch(up: &LeverSeen, down: &LeverSeen, back: &LeverSeen) -> Findi
 }
 
 /// How far the lever went down by a caliper, mm, where it was asked for [`LEVER_MM`].
-pub fn lever_scale(moved_mm: f64) -> Finding {
+pub(crate) fn lever_scale(moved_mm: f64) -> Finding {
     let (asked, off) = LEVER_MM;
     let scale = moved_mm / asked;
     let good = (moved_mm - asked).abs() <= off;
@@ -412,8 +413,7 @@ pub fn foam(ways: &[[LeverSeen; 2]]) -> Finding {
         .wrong(stopped.is_none() && most > LEVER_PLAY, &m::LEVER_STEPS, "")
 }
 
-/// The stage by its motor, a millimetre to the right and one back, with what a person saw of the first.
-pub fn stage_sense(right: &StageSeen, left: &StageSeen, went: Went) -> Finding {
+pub(crate) fn stage_sense(right: &StageSeen, left: &StageSeen, went: Went) -> Finding {
     let way = |seen: &StageSeen| {
         format!(
             "{:.2} mm with {:.0} mA at a duty of {:.2}{}",

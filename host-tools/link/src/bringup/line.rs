@@ -16,9 +16,6 @@ pub struct Line {
 
 impl Line {
     /// The frame of a question.
-    ///
-    /// # Errors
-    /// [`Trouble::Unexpected`]: never, for every question fits.
     pub fn question(&mut self, measure: Measure) -> Result<Vec<u8>, Trouble> {
         self.id = self.id.wrapping_add(1);
         let ask = Ask {
@@ -34,9 +31,6 @@ impl Line {
     }
 
     /// Takes in bytes of the board: the answer to the last question, if it is among them.
-    ///
-    /// # Errors
-    /// [`Trouble::OtherImage`] where only reports of another image come.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Option<Saw>, Trouble> {
         let mut found = None;
         for &byte in bytes {

@@ -4,8 +4,8 @@ use tactus_core::explorer::Strategy;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::wire::{Command, Event, Identify, Live, Phase, Report};
 
+use super::judge::Finding;
 use super::judge::mounted::{self as judge, SlideSeen};
-use super::result::StepResult;
 use super::seams::{Person, Probe, Trouble};
 use super::weights;
 
@@ -20,7 +20,6 @@ pub struct Mounted<'b> {
 }
 
 impl Mounted<'_> {
-    /// Asks, with no interest in what is said meanwhile but the one answer.
     fn answer<T>(
         &mut self,
         command: Command,
@@ -51,8 +50,7 @@ impl Mounted<'_> {
         )
     }
 
-    /// P_DC in the air, twice; then the force scale that was weighed is kept.
-    pub(super) fn zero(&mut self) -> Result<StepResult, Trouble> {
+    pub(super) fn zero(&mut self) -> Result<Finding, Trouble> {
         self.person.done(
             "Put the finger on its mount and computer paper under it, on the stage; nothing else is near",
         )?;
@@ -83,11 +81,10 @@ impl Mounted<'_> {
                     .map(|read| (mn_per_count, read == constants)),
             );
         }
-        Ok(judge::zero(&first, &second, kept.as_ref()).into())
+        Ok(judge::zero(&first, &second, kept.as_ref()))
     }
 
-    /// The stage's speed, with the finger in the air.
-    pub(super) fn speed(&mut self) -> Result<StepResult, Trouble> {
+    pub(super) fn speed(&mut self) -> Result<Finding, Trouble> {
         let mut places: Vec<(u32, Live)> = Vec::new();
         let mut unloaded = false;
         let done = self
@@ -97,21 +94,10 @@ impl Mounted<'_> {
                 Event::Live(live) if unloaded => places.push((report.at_ms, *live)),
                 _ => {}
             })?;
-        let first_ms = places.first().map_or(0, |(at_ms, _)| *at_ms);
-        let points = places.iter().map(|(at_ms, live)| {
-            let seconds = f64::from(at_ms.wrapping_sub(first_ms)) * 1e-3;
-            [seconds, f64::from(live.speed_um_s) * 1e-3]
-        });
-        Ok(StepResult::drawn(
-            judge::speed(done.err().as_deref(), &places),
-            "speed of the stage by its encoder, the finger in the air",
-            ["s", "mm/s"],
-            points.collect(),
-        ))
+        Ok(judge::speed(done.err().as_deref(), &places))
     }
 
-    /// The first slide.
-    pub(super) fn slide(&mut self) -> Result<StepResult, Trouble> {
+    pub(super) fn slide(&mut self) -> Result<Finding, Trouble> {
         self.person
             .watch("The finger comes down and slides over the paper once. Press the emergency stop if it does \
                  anything else.")?;
@@ -151,11 +137,6 @@ impl Mounted<'_> {
             Ok(counts) => seen.counts = counts,
             Err(why) => seen.failed = Some(why),
         }
-        Ok(StepResult::drawn(
-            judge::slide(&seen),
-            "force by P_DC during the first slide",
-            ["ms", "mN"],
-            seen.force,
-        ))
+        Ok(judge::slide(&seen))
     }
 }

@@ -67,9 +67,6 @@ impl Report {
     }
 
     /// Writes `report.txt` and, with the points of the curves, `report.json` into a folder.
-    ///
-    /// # Errors
-    /// They cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         std::fs::write(folder.join("report.txt"), self.text())?;
         let mut json = serde_json::to_string_pretty(self)?;

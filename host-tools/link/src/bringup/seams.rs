@@ -34,16 +34,10 @@ pub enum Trouble {
 /// The self-test at the other end of a line.
 pub trait Board {
     /// Asks, and waits for the answer.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
     fn ask(&mut self, measure: Measure) -> Result<Saw, Trouble>;
 
     /// Asks for something that ends with a new start of the board, and waits for that: why it started; `None` if it
     /// does not.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
     fn restart(&mut self, measure: Measure) -> Result<Option<Reset>, Trouble>;
 }
 
@@ -51,9 +45,6 @@ pub trait Board {
 pub trait Probe {
     /// Asks for something, and waits until it is over; `each` gets all that is said meanwhile. Within: why it was
     /// refused or came to nothing.
-    ///
-    /// # Errors
-    /// See [`Trouble`].
     fn ask(
         &mut self,
         command: Command,
@@ -64,9 +55,6 @@ pub trait Probe {
 /// Who is at the rig.
 pub trait Person {
     /// Does something, and says when it is done.
-    ///
-    /// # Errors
-    /// [`Trouble::Quit`], as of all others here.
     fn done(&mut self, please: &str) -> Result<(), Trouble>;
     /// Looks at something that moves in a moment.
     fn watch(&mut self, please: &str) -> Result<(), Trouble>;

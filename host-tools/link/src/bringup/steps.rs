@@ -7,11 +7,10 @@ use tactus_core::wire::bringup::{
 
 use super::judge::mounted::{AIR_COUNTS, OFF_LINE, SPEED_SHARE, UNEVEN_MM};
 use super::judge::{
-    self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
+    self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, Finding, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
     TRAVEL_MM, Went,
 };
 use super::mounted::Mounted;
-use super::result::StepResult;
 use super::seams::{Board, Person, Trouble};
 
 /// A step.
@@ -29,8 +28,8 @@ pub struct Step {
 
 /// What is done, and the image that it takes.
 pub(super) enum Run {
-    SelfTest(fn(&mut Bench<'_>) -> Result<StepResult, Trouble>),
-    Rig(fn(&mut Mounted<'_>) -> Result<StepResult, Trouble>),
+    SelfTest(fn(&mut Bench<'_>) -> Result<Finding, Trouble>),
+    Rig(fn(&mut Mounted<'_>) -> Result<Finding, Trouble>),
 }
 
 impl Step {
@@ -72,8 +71,6 @@ const WEIGHTS_G: [u8; 3] = [50, 100, 150];
 const MN_PER_G: f64 = 9.806_65;
 /// How long the last one stands, s.
 const HELD_S: u32 = 4;
-/// Title of the points of the force scale.
-const SCALE: &str = "weights on the finger by the counts of P_DC above that in the air";
 
 fn range((from, to): (f64, f64), unit: &str) -> String {
     format!("{from} to {to} {unit}")
@@ -99,7 +96,7 @@ pub static STEPS: &[Step] = &[
             let motor_v = bench
                 .person
                 .number("Measure the supply of the motors' drivers", "V")?;
-            Ok(judge::supplies(logic_v, motor_v).into())
+            Ok(judge::supplies(logic_v, motor_v))
         }),
     },
     Step {
@@ -115,7 +112,7 @@ pub static STEPS: &[Step] = &[
         run: Run::SelfTest(|bench| {
             let (reset, last_words) = bench.hello()?;
             let seen = ask!(bench, Measure::Chip, Chip);
-            Ok(judge::chip(&seen, reset, last_words.as_deref()).into())
+            Ok(judge::chip(&seen, reset, last_words.as_deref()))
         }),
     },
     Step {
@@ -129,7 +126,7 @@ pub static STEPS: &[Step] = &[
         run: Run::SelfTest(|bench| {
             // the pins are looked at when the board starts, before their drivers have them
             bench.board.restart(Measure::Restart)?;
-            Ok(judge::pins(&ask!(bench, Measure::Pins, Pins)).into())
+            Ok(judge::pins(&ask!(bench, Measure::Pins, Pins)))
         }),
     },
     Step {
@@ -137,7 +134,7 @@ pub static STEPS: &[Step] = &[
         checks: "the sensor's identity and its words",
         how: "the board reads it for a second",
         limit: || format!("{SLOTS_HZ} words, none garbled, late or silent"),
-        run: Run::SelfTest(|bench| Ok(judge::sensor(&bench.sensor()?).into())),
+        run: Run::SelfTest(|bench| Ok(judge::sensor(&bench.sensor()?))),
     },
     Step {
         key: "noise",
@@ -154,17 +151,7 @@ pub static STEPS: &[Step] = &[
                 .person
                 .done("Lay the finger down so that nothing touches its tip")?;
             let seen = bench.sensor()?;
-            let points = bench.points(1.0, 1.0)?;
-            let pac = points
-                .iter()
-                .zip(0..)
-                .map(|(point, at)| [f64::from(at) / 2.2, point[0]]);
-            Ok(StepResult::drawn(
-                judge::noise(&seen),
-                "P_AC of the finger that nobody touches",
-                ["ms", "counts"],
-                pac.collect(),
-            ))
+            Ok(judge::noise(&seen))
         }),
     },
     Step {
@@ -188,7 +175,7 @@ pub static STEPS: &[Step] = &[
             let looks = looks
                 .try_into()
                 .map_err(|_| Trouble::Unexpected("a switch".to_owned()))?;
-            Ok(judge::switches(&looks).into())
+            Ok(judge::switches(&looks))
         }),
     },
     Step {
@@ -204,7 +191,7 @@ pub static STEPS: &[Step] = &[
                 &["yes", "no"],
             )? == 0;
             bench.person.press(Pin::EStop, false)?;
-            Ok(judge::stop(seen, gone).into())
+            Ok(judge::stop(seen, gone))
         }),
     },
     Step {
@@ -227,7 +214,7 @@ pub static STEPS: &[Step] = &[
                 .done("Push it to the right until its switch opens")?;
             let right = bench.look()?;
             bench.person.done("Push it back to its middle")?;
-            Ok(judge::by_hand(&left, &right).into())
+            Ok(judge::by_hand(&left, &right))
         }),
     },
     Step {
@@ -238,14 +225,14 @@ pub static STEPS: &[Step] = &[
             let (zero, off) = limits::CURRENT_ZERO;
             format!("{zero} +- {off} counts, below {} rms", limits::CURRENT_RMS)
         },
-        run: Run::SelfTest(|bench| Ok(judge::rest(&bench.look()?).into())),
+        run: Run::SelfTest(|bench| Ok(judge::rest(&bench.look()?))),
     },
     Step {
         key: "finger",
         checks: "the finger is off its mount, and P_DC lives",
         how: "the person squeezes it in the hand: without that no motor moves",
         limit: || format!("P_DC rises by {} mN, and comes back", limits::SQUEEZED_MN),
-        run: Run::SelfTest(|bench| Ok(judge::squeezed(bench.squeeze()?).into())),
+        run: Run::SelfTest(|bench| Ok(judge::squeezed(bench.squeeze()?))),
     },
     Step {
         key: "lever-sense",
@@ -264,7 +251,7 @@ pub static STEPS: &[Step] = &[
             bench.person.watch(&question)?;
             let seen = bench.lever(Measure::Lever(steps))?;
             let went = bench.went("The lever went", [way, "the other way", "nowhere"])?;
-            Ok(judge::lever_sense(&seen, went).into())
+            Ok(judge::lever_sense(&seen, went))
         }),
     },
     Step {
@@ -275,15 +262,8 @@ pub static STEPS: &[Step] = &[
         run: Run::SelfTest(|bench| {
             let up = bench.lever(Measure::LeverTop)?;
             let down = bench.lever(Measure::Lever(3200))?;
-            let mut points = bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?;
             let back = bench.lever(Measure::LeverTop)?;
-            points.extend(bench.points(4.0 * 0.625e-3, 1.0 / 16.0)?);
-            Ok(StepResult::drawn(
-                judge::lever_switch(&up, &down, &back),
-                "P_DC above its rest while the lever goes 2 mm down and up, the finger off",
-                ["mm", "counts"],
-                points,
-            ))
+            Ok(judge::lever_switch(&up, &down, &back))
         }),
     },
     Step {
@@ -304,7 +284,7 @@ pub static STEPS: &[Step] = &[
                 .person
                 .number("The lever went down. Measure that height again", "mm")?;
             bench.lever(Measure::LeverTop)?;
-            Ok(judge::lever_scale(before - after).into())
+            Ok(judge::lever_scale(before - after))
         }),
     },
     Step {
@@ -323,7 +303,7 @@ pub static STEPS: &[Step] = &[
                 ways.push([down, bench.lever(Measure::LeverTop)?]);
             }
             bench.person.done("Take the foam away")?;
-            Ok(judge::foam(&ways).into())
+            Ok(judge::foam(&ways))
         }),
     },
     Step {
@@ -336,7 +316,7 @@ pub static STEPS: &[Step] = &[
             let right = ask_stage(bench, true)?;
             let went = bench.went("The stage went", ["to the right", "to the left", "nowhere"])?;
             let left = ask_stage(bench, false)?;
-            Ok(judge::stage_sense(&right, &left, went).into())
+            Ok(judge::stage_sense(&right, &left, went))
         }),
     },
     Step {
@@ -346,14 +326,8 @@ pub static STEPS: &[Step] = &[
         limit: || format!("more than {BRAKING_MA:.0} mA against the movement"),
         run: Run::SelfTest(|bench| {
             let right = ask_stage(bench, true)?;
-            let points = bench.points(1e-3, 1.0)?;
             let left = ask_stage(bench, false)?;
-            Ok(StepResult::drawn(
-                judge::bridge(&right, &left),
-                "the motor's current while the stage goes to the right",
-                ["mm", "mA"],
-                points,
-            ))
+            Ok(judge::bridge(&right, &left))
         }),
     },
     Step {
@@ -377,19 +351,9 @@ pub static STEPS: &[Step] = &[
             let Saw::Ramp(done) = done else {
                 return Err(Trouble::Unexpected(format!("{done:?}")));
             };
-            let mut points = bench.points(1.0, 1.0)?;
+            let points = bench.points()?;
             bench.person.done("Connect the stage's motor again")?;
-            let finding = judge::resistor(done, &points, supply_v, ohm);
-            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            for point in &mut points {
-                point[0] *= 1e-3;
-            }
-            Ok(StepResult::drawn(
-                finding,
-                "current of the resistor by the bridge's duty",
-                ["duty", "mA"],
-                points,
-            ))
+            Ok(judge::resistor(done, &points, supply_v, ohm))
         }),
     },
     Step {
@@ -399,7 +363,7 @@ pub static STEPS: &[Step] = &[
         limit: || "the same".to_owned(),
         run: Run::SelfTest(|bench| {
             let done = ask!(bench, Measure::Store, Store);
-            Ok(judge::store(&done.map_err(|why| why.to_string())).into())
+            Ok(judge::store(&done.map_err(|why| why.to_string())))
         }),
     },
     Step {
@@ -407,9 +371,7 @@ pub static STEPS: &[Step] = &[
         checks: "the watchdog",
         how: "the board hangs on purpose",
         limit: || "it starts again, by the watchdog".to_owned(),
-        run: Run::SelfTest(|bench| {
-            Ok(judge::watchdog(bench.board.restart(Measure::Watchdog)?).into())
-        }),
+        run: Run::SelfTest(|bench| Ok(judge::watchdog(bench.board.restart(Measure::Watchdog)?))),
     },
     Step {
         key: "scale",
@@ -443,12 +405,10 @@ pub static STEPS: &[Step] = &[
             let [last, _] = bench.sensor()?.pdc;
             bench.person.done("Take the weight away")?;
             let [after, _] = bench.sensor()?.pdc;
-            Ok(StepResult::drawn(
-                judge::mounted::scale(&points, last - first, after - air),
-                SCALE,
-                ["counts", "mN"],
-                points,
-            ))
+            Ok(Finding {
+                points: points.clone(),
+                ..judge::mounted::scale(&points, last - first, after - air)
+            })
         }),
     },
     Step {
@@ -537,15 +497,12 @@ impl Bench<'_> {
         Ok(Went::ALL.get(chosen).copied().unwrap_or(Went::Nowhere))
     }
 
-    /// The last series, its coordinates times these.
-    fn points(&mut self, x: f64, y: f64) -> Result<Vec<[f64; 2]>, Trouble> {
+    /// The last series.
+    fn points(&mut self) -> Result<Vec<[f64; 2]>, Trouble> {
         let mut points = Vec::new();
         while points.len() < MAX_POINTS {
             let part = ask!(self, Measure::Series(points.len() as u16), Series);
-            points.extend(
-                part.iter()
-                    .map(|[a, b]| [f64::from(*a) * x, f64::from(*b) * y]),
-            );
+            points.extend(part.iter().map(|point| point.map(f64::from)));
             if part.len() < POINTS {
                 break;
             }

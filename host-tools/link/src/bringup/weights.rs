@@ -17,9 +17,6 @@ pub enum WeightError {
 
 /// The line through counts and weights in mN, and through 0 and 0, where the finger is in the air: mN a count, and how
 /// far each weight is off it, mN.
-///
-/// # Errors
-/// See [`WeightError`].
 pub fn line(points: &[(f32, f32)]) -> Result<(f32, Vec<f32>), WeightError> {
     let mut line = LineFit::default();
     line.push(0.0, 0.0);

@@ -64,9 +64,6 @@ pub struct Figure {
     pub title: String,
     /// The drawing.
     pub svg: String,
-    /// Its width and height, px.
-    #[serde(skip)]
-    size: (u32, u32),
 }
 
 /// Text of a part of a drawing for those who point at it or cannot see it.
@@ -104,7 +101,6 @@ pub(super) fn figure(
         id: id.into(),
         title: title.to_owned(),
         svg: drawing,
-        size,
     };
     let tips = tips.iter().map(|tip| {
         let [left, top, right, bottom] = tip.area;
@@ -124,30 +120,6 @@ impl Figure {
     pub(super) fn add(&mut self, drawing: &str) {
         if let Some(end) = self.svg.rfind("</svg>") {
             self.svg.insert_str(end, drawing);
-        }
-    }
-
-    /// All figures in one, one below the other.
-    pub fn stacked(id: &str, title: &str, figures: &[Self]) -> Self {
-        let width = figures.iter().map(|f| f.size.0).max().unwrap_or(0);
-        let height: u32 = figures.iter().map(|f| f.size.1).sum();
-        let mut svg = format!(
-            "<svg {FITS} width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n",
-            escaped(title)
-        );
-        let mut y = 0;
-        for figure in figures {
-            let place = format!("y=\"{y}\"");
-            svg += &figure.svg.replacen(FITS, &place, 1);
-            y += figure.size.1;
-        }
-        svg += "</svg>\n";
-        Self {
-            id: id.to_owned(),
-            title: title.to_owned(),
-            svg,
-            size: (width, height),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Picture of `tactus evaluate`: the verdicts on each texture.
 
-use tactus_core::explorer::Told;
+use tactus_core::explorer::VerdictKind;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::{COLOURS, DrawError, Figure};
@@ -24,10 +24,10 @@ pub fn confusion(
     for course in courses {
         let (told, _, texture) = course.told(threshold);
         let column = match told {
-            Told::Sure => texture,
-            Told::Changed => known,
-            Told::New => known + 1,
-            Told::Undecided => known + 2,
+            VerdictKind::Sure => texture,
+            VerdictKind::Changed => known,
+            VerdictKind::New => known + 1,
+            VerdictKind::Undecided => known + 2,
         };
         counts[course.presented][column] += 1;
     }

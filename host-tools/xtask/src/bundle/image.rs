@@ -8,7 +8,6 @@ use object::{Endianness, elf};
 const FLASH: u32 = 0x0800_0000;
 const FLASH_LENGTH: usize = 1024 << 10;
 
-/// An ELF as one piece of memory.
 pub(super) fn flat(elf: &[u8]) -> Result<Vec<u8>> {
     joined(&loads(elf)?)
 }

@@ -8,7 +8,6 @@ use anyhow::{Context as _, Result, ensure};
 use crate::shell::{cargo, root};
 use crate::toolchain;
 
-/// Beginnings of the names of files that are licences.
 const NAMES: [&str; 5] = ["LICEN", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE"];
 
 /// One text for all parts, each a manifest, a package and a platform: a list of crates, then each licence once.
@@ -60,7 +59,6 @@ pub(super) fn of(parts: &[(&str, &str, Option<&str>)]) -> Result<String> {
     Ok(listed(&found))
 }
 
-/// The folder of a crate's source.
 fn folder(name: &str) -> Option<PathBuf> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(Path::new(&std::env::var_os("HOME")?).join(".cargo")))?;
@@ -100,7 +98,6 @@ fn listed(crates: &[(String, String, Vec<String>)]) -> String {
     all
 }
 
-/// The texts of the licences in a folder, each once.
 fn licences_in(folder: &Path) -> Result<Vec<String>> {
     let mut texts = BTreeSet::new();
     for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {

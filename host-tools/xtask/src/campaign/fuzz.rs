@@ -10,9 +10,7 @@ use clap::Parser;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain;
 
-/// The binaries of tests/fuzz.
 const TARGETS: [&str; 4] = ["wire", "table", "store", "recordings"];
-/// Longest input, bytes.
 const MAX_LEN: usize = 8192;
 
 /// Attacks the parsers.
@@ -51,7 +49,6 @@ pub(super) fn fuzz(options: &[OsString]) -> Result<String> {
     Ok(format!("Nothing broke: {}.", lines.join(", ")))
 }
 
-/// Builds the targets; the folder of their programs.
 fn build() -> Result<PathBuf> {
     let runs = |program: &&str| Command::new(program).arg("--version").output().is_ok();
     ensure!(
@@ -80,7 +77,6 @@ fn build() -> Result<PathBuf> {
     Ok(folder.join(host).join("release"))
 }
 
-/// Attacks a target: a line about it, and what broke it.
 fn attack(programs: &Path, name: &str, options: &Options) -> Result<(String, Option<String>)> {
     let folder = target().join("fuzz");
     let seeds = folder.join("seeds").join(name);

@@ -11,7 +11,6 @@ use super::Options;
 use crate::shell::{self, cargo};
 use crate::{emulate, firmware};
 
-/// Names the world of the test of presses.
 const WORLD: &str = "TACTUS_PRESSES_WORLD";
 
 /// Verdict of a run; those behind `Right` are listed.
@@ -23,7 +22,6 @@ enum Ending {
     Failed,
 }
 
-/// The line of JSON at the end of a run's output.
 #[derive(Debug)]
 struct Explored {
     ending: Ending,
@@ -32,7 +30,6 @@ struct Explored {
     force_errors: Vec<f64>,
     /// By hand: from the hand's standing still to the verdict on the display, s; negative where the verdict was first.
     end_to_screen_s: Option<f64>,
-    /// Lost, late and damaged.
     wrong: [u64; 3],
 }
 
@@ -159,7 +156,6 @@ fn command(run: &str, seed: u64, elf: &Path, options: &Options) -> Command {
     command
 }
 
-/// Runs the test of all presses in each of these worlds.
 pub(super) fn presses(seeds: &RangeInclusive<u64>) -> Result<String> {
     for seed in seeds.clone() {
         let mut test = cargo();

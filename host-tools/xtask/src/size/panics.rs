@@ -7,13 +7,11 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 /// What a call of a function that panics comes from.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Kind {
-    /// A check in a dependency.
     Dependency,
     /// The body of an async function, which panics when it is polled after its end: no executor does that.
     Resumed,
     /// Several checks of one function that the compiler has made one: it does not say which.
     Merged,
-    /// A check in the core or in the firmware.
     Ours,
 }
 
@@ -55,7 +53,6 @@ struct Frame {
     line: u32,
 }
 
-/// A call of a function that panics.
 #[derive(PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Panic {
     pub(super) kind: Kind,
@@ -129,7 +126,6 @@ pub(super) fn panics(elf: &[u8]) -> Result<Vec<Panic>> {
 
 type Reader<'e> = addr2line::gimli::EndianSlice<'e, addr2line::gimli::LittleEndian>;
 
-/// The debug information of an image.
 struct Lines<'e>(addr2line::Context<Reader<'e>>);
 
 impl<'e> Lines<'e> {

@@ -101,7 +101,7 @@ fn a_first_look_is_what_an_explorer_of_that_length_says() {
         assert_eq!(look.texture, best.texture);
         assert!((f64::from(look.doubt) - (1.0 - f64::from(best.probability))).abs() < 2e-6);
         // the limits of this length are the lower ones: they decide
-        assert_eq!(look.known, best.told() == Told::Sure, "{z:?}");
+        assert_eq!(look.known, best.kind() == VerdictKind::Sure, "{z:?}");
         known_ones += i32::from(look.known);
         new_ones += i32::from(best.unknown);
         // nothing has happened

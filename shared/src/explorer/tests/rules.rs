@@ -1,7 +1,6 @@
 //! When to stop, what to leave out, whom to believe: the explorer's rules one by one.
 
 use super::*;
-use std::string::ToString;
 
 #[test]
 fn the_papers_settings() {
@@ -387,39 +386,6 @@ fn without_room_candidates_or_properties_there_is_no_exploration() {
     )
     .map(|_| ());
     assert_eq!(other, Err(ExplorerError::NothingToMeasure));
-}
-
-#[test]
-fn the_errors_say_what_is_missing() {
-    for (error, message) in [
-        (
-            ExplorerError::NoSpace {
-                textures: 117,
-                capacity: 20,
-            },
-            "the textures of the table are 117, and there is room for 20",
-        ),
-        (
-            ExplorerError::Candidates,
-            "candidates are not textures of the table",
-        ),
-        (
-            ExplorerError::NothingToMeasure,
-            "no property that this rig measures was learned of every candidate",
-        ),
-    ] {
-        assert!(error.to_string().contains(message), "{error}");
-    }
-    let missing = ObserveError::Missing(Property::Fineness);
-    assert_eq!(
-        missing.to_string(),
-        "the slide did not give a value of fineness"
-    );
-    let action = ObserveError::Action(act(1, Property::Roughness));
-    assert_eq!(
-        action.to_string(),
-        "roughness of movement 2 is none of the actions"
-    );
 }
 
 /// The study's size, learned from five trials each: the paper's equations in f64 give the same explorations.

@@ -292,20 +292,3 @@ fn far_off_values_neither_overflow_nor_stick() {
         }
     }
 }
-
-/// As with the features: the most that is counted is 255 slides.
-#[test]
-fn beyond_255_slides_nothing_changes() {
-    let bytes = plain(&[0.0, 0.01, 0.02], 1);
-    let table = Table::read(&bytes).unwrap();
-    let mut explorer = begin(table, PropertySet::ALL, Method::StudentAll);
-    let action = explorer.expected_outcomes()[0].action;
-    for _ in 0..255 {
-        explorer.observe(action, &all(0.004)).unwrap();
-    }
-    let posterior = explorer.posterior().to_vec();
-    for _ in 0..100 {
-        explorer.observe(action, &all(0.02)).unwrap();
-        assert_eq!(explorer.posterior(), posterior);
-    }
-}

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::dsp::Plan;
-use crate::explorer::{Answer, Verification};
 use crate::handheld::weights::WEIGHTS_MN;
 use crate::probe::Memory;
 use crate::probe::explore::Random;
@@ -13,7 +12,6 @@ use crate::store::Store;
 use crate::store::tests::ram::{Ram, SECTOR};
 use crate::wire::Again;
 use embassy_futures::block_on;
-use heapless::Vec;
 use std::string::{String, ToString as _};
 use std::vec::Vec as List;
 
@@ -443,64 +441,4 @@ fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
     block_on(rig.set_force(&mut memory));
     assert_eq!(rig.calibration(), set);
     assert!(!shown(&rig).starts_with("Calibrated"), "{}", shown(&rig));
-}
-
-#[test]
-fn what_the_host_found_out_is_shown() {
-    struct Nobody;
-    impl Events for Nobody {
-        fn tell(&mut self, _: Event) {}
-        fn table(&mut self, _: TableInUse) {}
-    }
-    let mut shown = Shown::new(Nobody);
-    assert!(shown.judgement().is_none());
-    let posterior = [0.1, 0.6, 0.05, 0.25];
-    shown.tell(Event::SlideReport {
-        slide: 1,
-        action: crate::table::Action {
-            movement: 0,
-            property: None,
-        },
-        observed: crate::wire::SlideReport {
-            properties: [None; 3],
-            roughness_is_bound: false,
-            background: 1.0,
-            bands: Vec::new(),
-            pressure: None,
-            pace: None,
-        },
-        posterior: Vec::from_slice(&posterior).unwrap(),
-    });
-    shown.tell(Event::Verdict(crate::wire::Verdict {
-        texture: 1,
-        name: Name::new(),
-        probability: 0.6,
-        sure: false,
-        unknown: false,
-        changed: false,
-        log_odds: None,
-        slides: 1,
-        wants_label: false,
-    }));
-    let judgement = shown.judgement().unwrap();
-    let leading: List<_> = judgement.leading.iter().copied().collect();
-    assert_eq!(leading, [(1, 0.6), (3, 0.25), (0, 0.1)]);
-    assert!(!judgement.sure && !judgement.open);
-    assert!(shown.judgement().is_none());
-    // the question about one texture
-    for (answer, sure, unknown) in [
-        (Answer::Same, true, false),
-        (Answer::Different, false, true),
-        (Answer::Unsure, false, false),
-    ] {
-        let now = Verification {
-            score: 0.0,
-            limit: 0.0,
-            answer,
-        };
-        shown.tell(Event::Verified { slides: 1, now });
-        let judgement = shown.judgement().unwrap();
-        assert_eq!((judgement.sure, judgement.unknown), (sure, unknown));
-        assert!(!judgement.changed && !judgement.open);
-    }
 }

@@ -10,7 +10,6 @@ use embedded_graphics::pixelcolor::BinaryColor;
 /// Letters in a line of a font's picture, which begins with a blank.
 const IN_A_LINE: i32 = 16;
 
-/// A font of letters that are all as wide.
 pub(super) struct Font {
     letters: ImageRaw<'static, BinaryColor>,
     width: i32,

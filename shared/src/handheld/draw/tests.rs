@@ -30,8 +30,19 @@ fn wheel(turns: usize) -> [Place; WHEEL] {
     spelling.wheel()
 }
 
+fn rows<const N: usize>(rows: &[Row<'static>]) -> Vec<Row<'static>, N> {
+    Vec::from_slice(rows).unwrap()
+}
+
 /// Every screen, by name.
 fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
+    draw_touches(&mut each);
+    draw_verdicts(&mut each);
+    draw_lists(&mut each);
+    draw_ends(&mut each);
+}
+
+fn draw_touches(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
     let press = |force_mn, down| Screen::Press {
         slide: 1,
         of: 5,
@@ -46,7 +57,6 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         way,
     };
     let slide = |progress| seen(progress, Way::NoSensor);
-    let rows = |rows: &[Row<'static>]| Vec::from_slice(rows).unwrap();
     each("air", &Screen::Air);
     each("ready", &Screen::Ready { textures: 117 });
     each("press", &press(0.0, false));
@@ -84,6 +94,9 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
     each("turned", &Screen::Turned(Ok(turned)));
     let askew = Screen::Turned(Err("That is not 1 g. Hold it straight."));
     each("turned-askew", &askew);
+}
+
+fn draw_verdicts(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
     each("thinking", &Screen::Thinking { slide: 2 });
     for (name, done) in [
         (
@@ -144,6 +157,9 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         rows: rows(&[row("Cardboard", 0.98), row(LONG, 0.02)]),
     };
     each("changed", &changed);
+}
+
+fn draw_lists(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
     let entries: Vec<Entry<'_>, LINES> = Vec::from_slice(&[
         Entry::Text(LONG),
         Entry::Text("felt"),
@@ -213,6 +229,9 @@ fn draw_all(mut each: impl FnMut(&'static str, &Screen<'_>)) {
         };
         each(name, &compared);
     }
+}
+
+fn draw_ends(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
     each("saving", &Screen::Saving);
     let name = Name::try_from("velvet").unwrap();
     each("taught", &Screen::Learned(Ok(&name)));

@@ -1,7 +1,7 @@
 //! Requests of the host to the person who holds the probe: a slide, the finger in the air, or a weight on it. The pages
 //! are those of the person's own use; the measurement belongs to the host.
 
-use super::{Answer, Asked, Handheld, Page};
+use super::{Answer, Handheld, Page, RequestedSlide};
 use crate::features::Slide;
 use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
@@ -14,7 +14,7 @@ use crate::table::Name;
 use crate::wire::Prompt;
 
 impl<'p> Handheld<'p> {
-    fn ask(&mut self, asked: Asked, page: Page) {
+    fn ask(&mut self, asked: RequestedSlide, page: Page) {
         self.clear_episode();
         self.job = None;
         self.answer = None;
@@ -23,30 +23,27 @@ impl<'p> Handheld<'p> {
         self.show(page);
     }
 
-    /// Asks the person for a slide; [`Handheld::answer`] gives the result.
-    pub fn ask_for_slide(&mut self, asked: Asked) {
+    pub(crate) fn ask_for_slide(&mut self, asked: RequestedSlide) {
         self.ask(asked, Page::Touching);
     }
 
     /// Asks the person to hold the finger in the air; P_DC's zero is taken anew.
-    pub fn ask_for_air(&mut self) {
-        self.ask(Asked::default(), Page::Air);
+    pub(crate) fn ask_for_air(&mut self) {
+        self.ask(RequestedSlide::default(), Page::Air);
         self.touch.restart();
     }
 
-    /// Asks the person to lift the finger.
-    pub fn ask_to_lift(&mut self) {
-        self.ask(Asked::default(), Page::Lift);
+    pub(crate) fn ask_to_lift(&mut self) {
+        self.ask(RequestedSlide::default(), Page::Lift);
     }
 
-    /// Asks the person to put a weight of so many mN on the finger.
-    pub fn ask_for_weight(&mut self, mn: u16) {
-        self.ask(Asked::default(), Page::Weigh(mn));
+    pub(crate) fn ask_for_weight(&mut self, mn: u16) {
+        self.ask(RequestedSlide::default(), Page::Weigh(mn));
     }
 
     /// Asks the person to point the finger straight down, and then to turn it `over`.
-    pub fn ask_to_turn(&mut self, over: bool) {
-        self.ask(Asked::default(), Page::Turn(over));
+    pub(crate) fn ask_to_turn(&mut self, over: bool) {
+        self.ask(RequestedSlide::default(), Page::Turn(over));
         if over {
             self.sound(super::GOOD);
         }
@@ -88,7 +85,7 @@ impl<'p> Handheld<'p> {
     }
 
     /// Another table is in force, with so many textures: leaves the pages of the old one.
-    pub fn table_changed(&mut self, textures: u16) {
+    pub(crate) fn table_changed(&mut self, textures: u16) {
         self.textures = textures;
         if matches!(
             self.page,
@@ -165,7 +162,7 @@ impl<'p> Handheld<'p> {
     }
 
     /// Mean P_DC of the last 100 ms, counts above that in the air.
-    pub fn counts_above_air(&self) -> Option<f32> {
+    pub(crate) fn counts_above_air(&self) -> Option<f32> {
         self.touch.counts_above_air()
     }
 

@@ -17,7 +17,6 @@ pub enum Choice {
     Spelled(Name),
 }
 
-/// The lists.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum List {
     /// The menu.
@@ -38,7 +37,6 @@ impl List {
     }
 }
 
-/// The entries of the lists.
 pub(super) enum Entry {
     Compare,
     About,
@@ -71,13 +69,11 @@ impl<'j> Entries<'j> {
         }
     }
 
-    /// The leading textures of the last judgement.
     pub(super) fn leading(self) -> impl Iterator<Item = u16> + Clone + 'j {
         let leading = self.judgement.into_iter().flat_map(|j| j.leading.iter());
         leading.map(|(texture, _)| *texture)
     }
 
-    /// The meaning of an entry.
     pub(super) fn entry(self, at: u16) -> Entry {
         match (self.list, at) {
             (List::Menu, 0) => return Entry::Compare,

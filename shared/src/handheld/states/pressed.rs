@@ -79,7 +79,6 @@ impl Handheld<'_> {
         self.sound(CLICK);
     }
 
-    /// Carries out an entry.
     fn take(&mut self, list: List, at: u16) {
         match self.entries(list).entry(at) {
             Entry::Compare => self.show(Page::Choose(List::Reference, 0)),

@@ -269,25 +269,6 @@ fn a_training_takes_three_good_slides() {
     assert_eq!(bench.learned, [(Choice::Known(3), 3)]);
 }
 
-#[test]
-fn a_rejected_slide_is_no_part_of_the_episode() {
-    let plan = Plan::new();
-    let mut bench = Bench::new(&plan);
-    for why in [
-        Again::TooHard,
-        Again::TooLight,
-        Again::TooShort,
-        Again::TooUneven,
-        Again::Disturbed,
-    ] {
-        bench.touch(Event::Again(why));
-        assert_eq!(bench.shown(), "Again");
-        assert!(bench.probe.episode.is_empty() && bench.probe.job.is_none());
-    }
-    bench.slide(Some(1));
-    assert_eq!(bench.episode.as_ref().unwrap().observed[0].1, 1);
-}
-
 /// From the ready page to the touch that is compared with a texture.
 fn choose_reference(bench: &mut Bench<'_>, texture: u16) {
     bench.press(10);

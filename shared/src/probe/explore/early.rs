@@ -6,12 +6,10 @@ use crate::rig::Rig;
 use crate::sensor::pressure::samples_in;
 use crate::table::Action;
 
-/// A length of the table, at which a slide ended.
 #[derive(Clone, Copy)]
 pub(super) struct Length {
     /// Its number, from 1.
     n: u8,
-    /// At constant speed.
     pub(super) ms: u16,
 }
 

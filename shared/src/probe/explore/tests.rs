@@ -8,7 +8,7 @@ use crate::table::tests::{around, table_of};
 use embassy_futures::block_on;
 use std::cell::RefCell;
 use std::format;
-use std::string::{String, ToString};
+use std::string::String;
 use std::vec;
 use std::vec::Vec;
 
@@ -374,24 +374,5 @@ fn a_random_choice_takes_what_it_is_given() {
     assert_eq!(
         (told[0].as_str(), told[2].as_str()),
         ("traction 0", "traction 1")
-    );
-}
-
-#[test]
-fn the_errors_say_why() {
-    let error = |error: ExploreError<&str>| error.to_string();
-    assert_eq!(error(ExploreError::Rig("e-stop")), "e-stop");
-    assert_eq!(
-        error(ExploreError::Rejected(STUCK)),
-        "no movement gives a good slide: the slide never reached its steady part"
-    );
-    assert_eq!(
-        error(ExploreError::Movement(2)),
-        "the table has no movement 3"
-    );
-    let missing: Rejection<&str> = Rejection::Observe(ObserveError::Missing(Property::Fineness));
-    assert_eq!(
-        missing.to_string(),
-        "the slide did not give a value of fineness"
     );
 }

@@ -490,8 +490,8 @@ const WAYS: [Torn; 6] = [
     Torn::All,
 ];
 
-/// Cuts an operation, which says whether it went well, at every word and in every erase; hands the store as it is afterwards
-/// to `check`.
+/// Cuts an operation, which says whether it went well, at every word and in every erase; hands the store as it is
+/// afterwards to `check`.
 fn cut_everywhere(
     ram: &Ram,
     operation: impl Fn(&mut Store<Ram>) -> bool,

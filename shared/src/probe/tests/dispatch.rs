@@ -251,7 +251,7 @@ fn a_table_whose_bytes_have_changed_is_reported_whatever_is_in_its_place() {
 
 fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
     let done = block_on(probe.perform(&command));
-    done.map_err(|why| why.to_string())
+    done.map(drop).map_err(|why| why.to_string())
 }
 
 fn name(name: &str) -> Name {
@@ -471,9 +471,10 @@ fn an_exploration_is_kept_until_the_rig_moves_again() {
     let empty = command(&mut probe, Command::Label(name(""))).unwrap_err();
     assert!(!empty.starts_with("nothing"), "{empty}");
     command(&mut probe, Command::Label(name("elm"))).unwrap();
-    assert!(
-        matches!(probe.events.told.last(), Some(Event::TextureLearned(TextureLearned { itself: false, name, .. })) if name == "elm")
-    );
+    assert!(matches!(
+        probe.events.told.last(),
+        Some(Event::TextureLearned(TextureLearned { itself: false, name, .. })) if name == "elm"
+    ));
     let table = *probe.events.tables.last().unwrap();
     assert_eq!((table.textures, table.factory), (5, false));
     // once is enough
@@ -505,9 +506,10 @@ fn what_the_probe_learns_by_itself_is_reported_and_in_force() {
     command(&mut probe, exploration(true)).unwrap();
     let after = *probe.events.tables.last().unwrap();
     assert!(before.crc != after.crc && after.factory);
-    assert!(
-        matches!(probe.events.told.last(), Some(Event::TextureLearned(TextureLearned { itself: true, slides: 1, name })) if name == "t2")
-    );
+    assert!(matches!(
+        probe.events.told.last(),
+        Some(Event::TextureLearned(TextureLearned { itself: true, slides: 1, name })) if name == "t2"
+    ));
     command(&mut probe, Command::Forget(Forget::SelfLearned)).unwrap();
     assert_eq!(*probe.events.tables.last().unwrap(), before);
 }

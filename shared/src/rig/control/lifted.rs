@@ -8,9 +8,6 @@ use crate::rig::slide::Run;
 impl Control {
     /// Moves the stage over the whole sample at `speed_um_s` um/s with the finger lifted, and measures the motor
     /// current at constant speed: see [`Control::mean_current_a`].
-    ///
-    /// # Errors
-    /// See [`Refused`].
     #[inline]
     pub fn start_unloaded(&mut self, speed_um_s: u32) -> Result<(), Refused> {
         self.may_start()?;
@@ -48,9 +45,6 @@ impl Control {
     /// Expects a person to lay a weight of so many mN on the lifted finger; 0 ends that. Until then, or until something
     /// else begins, P_DC may rise by that much more than otherwise while the finger waits. The guard's limit of force
     /// and the lever's switch, to which the lever goes first, protect the finger as ever.
-    ///
-    /// # Errors
-    /// See [`Refused`].
     #[inline]
     pub fn weigh(&mut self, mn: u16) -> Result<(), Refused> {
         self.may_start()?;

@@ -1,4 +1,4 @@
-//! What is right in a new rig: for the self-test's own checks, and for the host that judges its measurements.
+//! Limits of what is right in a new rig, for the host that judges its measurements.
 
 use core::ops::RangeInclusive;
 

@@ -10,8 +10,8 @@ use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_link::Request;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, STEPS,
-    Step, Trouble, judge,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, Step,
+    Trouble, judge,
 };
 
 use super::bench::{Bench, BenchError, Interrupt};
@@ -24,11 +24,10 @@ use crate::cmd::output::Format;
 Examples:
   cargo xtask flash --self-test            the image that measures; it stays on the board until it has passed
   tactus device bringup                    goes on where it stopped last time
-  tactus device bringup --list             the steps, and what is right in each
   tactus device bringup --report rig2      another rig
 
-Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each step that is over is
-kept in DIR/journal.jsonl; DIR/report.txt and report.json, with the curves, are to be sent to somebody who helps.
+Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each
+step that is over is kept in DIR/journal.jsonl; DIR/report.txt and report.json are to be sent to somebody who helps.
 Ctrl-C stops whatever moves; the exit code is 130 then. It is 1 while a step has not passed.")]
 pub(crate) struct Args {
     /// The board's serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
@@ -37,9 +36,6 @@ pub(crate) struct Args {
     /// Folder of the journal and of the report
     #[arg(long, value_name = "DIR", default_value = "bringup")]
     report: PathBuf,
-    /// List the steps, and what has passed in DIR, without a board
-    #[arg(long)]
-    list: bool,
 }
 
 /// A board that starts answers within this.
@@ -53,16 +49,6 @@ const TRIES: u32 = 3;
 const HELLO: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    if how.list {
-        let journal = how.report.join("journal.jsonl");
-        return list(
-            journal
-                .exists()
-                .then(|| Journal::open(&journal))
-                .transpose()?,
-            out,
-        );
-    }
     std::fs::create_dir_all(&how.report)?;
     let mut journal = Journal::open(&how.report.join("journal.jsonl"))?;
     let interrupt = Interrupt::catch()?;
@@ -106,7 +92,8 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             );
         }
         Ended::Flash(_) => eprintln!(
-            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does the last steps"
+            "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does \
+             the last steps"
         ),
         Ended::Failed => bail!("a step has not passed; the same command runs it again"),
     }
@@ -135,25 +122,6 @@ impl Probe for Linked {
             Err(why) => Err(io::Error::other(why.to_string()).into()),
         }
     }
-}
-
-fn list(journal: Option<Journal>, out: &mut impl Write) -> anyhow::Result<()> {
-    for step in STEPS {
-        let last = journal.as_ref().and_then(|journal| journal.last(step.key));
-        let state = match last {
-            None => "to do",
-            Some(entry) if entry.passed => "passed",
-            Some(_) => "FAILED",
-        };
-        writeln!(
-            out,
-            "{state:<7} {:<13} {}: {}",
-            step.key,
-            step.checks,
-            (step.limit)()
-        )?;
-    }
-    Ok(())
 }
 
 struct Serial {

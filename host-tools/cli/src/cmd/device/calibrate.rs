@@ -22,16 +22,17 @@ Examples:
   tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
                                             also takes what was measured on an incline and on a scale
 
-`tactus device status` shows what is in use. What a count of P_DC is worth in mN has a day only once it was measured: with --weights, or with --force-mn-per-count.
-Until then it is the paper's, of another finger.")]
+`tactus device status` shows what is in use. What a count of P_DC is worth in mN has a day only once it was
+measured: with --weights, or with --force-mn-per-count. Until then it is the paper's, of another finger.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
-    /// Measure what a count of acceleration is worth, and nothing else: the finger points straight down and keeps still, then straight
-    /// up. For a finger with an accelerometer
+    /// Measure what a count of acceleration is worth, and nothing else: the finger points straight down and keeps
+    /// still, then straight up. For a finger with an accelerometer
     #[arg(long, conflicts_with_all = ["drifted", "newton_per_ampere"])]
     turn_over: bool,
-    /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it anew
+    /// The finger has drifted further than the probe allows: discard the P_DC that it had in the air, and measure it
+    /// anew
     #[arg(long)]
     drifted: bool,
     /// Shear per motor current, N/A, from pulls on an inclined stage
@@ -40,8 +41,8 @@ pub(crate) struct Args {
     /// Contact force per count of P_DC, mN, measured by presses on a scale
     #[arg(long, value_name = "X")]
     force_mn_per_count: Option<f32>,
-    /// Three known weights or more, N, or g as in 30g, which the probe asks for one after the other: each is laid on the finger,
-    /// or a kitchen scale is pressed against it until it shows that
+    /// Three known weights or more, N, or g as in 30g, which the probe asks for one after the other: each is laid on
+    /// the finger, or a kitchen scale is pressed against it until it shows that
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newton)]
     weights: Vec<u16>,
 }

@@ -1,7 +1,7 @@
 //! `tactus device doctor`: whether PC, line, probe and table are fit for work, and what to do where they are not.
 
-use std::io::{self, Write};
-use std::time::{Duration, Instant};
+use std::io::Write;
+use std::time::Instant;
 
 use anyhow::ensure;
 use serde::Serialize;
@@ -26,8 +26,8 @@ Examples:
   tactus device doctor --port /dev/ttyACM1
   tactus device doctor --format json > doctor.json    to send to somebody
 
-Nothing moves. It takes some five seconds, since the probe's clock is held against this PC's. The probe writes one of its settings again,
-as it is, to show that its store works. Exit code: 0 if nothing is wrong, 1 otherwise; what is only worth a look leaves 0.")]
+Nothing moves. The probe writes one of its settings again, as it is, to show that its store works. Exit code: 0 if
+nothing is wrong, 1 otherwise; what is only worth a look leaves 0.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -36,13 +36,7 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// How the clocks are compared: so many looks at the beginning and at the end of so long.
 const LOOKS: usize = 20;
-const CLOCK: Duration = Duration::from_secs(4);
-/// A crystal is within 100 ppm; a look is as exact as a millisecond and what the line adds.
-const MAX_PPM: f64 = 1500.0;
-/// A clock that is off by more is none that runs in real time: an emulated board's.
-const EMULATED_PPM: f64 = 50_000.0;
 /// A load cell drifts, and a BioTac loses water, in half a year.
 const OLD_DAYS: i64 = 180;
 /// Damaged words of all words: the firmware's own limit within a second.
@@ -155,7 +149,7 @@ or, for all who sit at this PC, a rule for udev:
 
 fn examine(bench: &mut Bench, status: &Status, checks: &mut Checks) -> Result<(), BenchError> {
     checks.good("port", bench.name.clone());
-    clock_and_line(bench, checks)?;
+    line(bench, checks)?;
     match status.fault {
         Some(fault) => checks.bad("rig", fault.to_string(), remedy(fault)),
         None => checks.good("rig", "no fault".to_owned()),
@@ -188,60 +182,24 @@ fn remedy(fault: Fault) -> String {
     format!("{} (`tactus device home`)", fault.recovery())
 }
 
-/// The probe's clock against this PC's, and how long an answer takes.
-fn clock_and_line(bench: &mut Bench, checks: &mut Checks) -> Result<(), BenchError> {
+/// How long an answer takes, and what was lost.
+fn line(bench: &mut Bench, checks: &mut Checks) -> Result<(), BenchError> {
     let mut taken = Vec::new();
-    let began = Instant::now();
-    // what the line holds up only adds: the least of some looks is right
-    let mut offset = |bench: &mut Bench| {
-        let mut least = f64::INFINITY;
-        for _ in 0..LOOKS {
-            let asked = Instant::now();
-            let (mut at_ms, probe) = (None, bench.probe.clone());
-            let status = probe.run(Request::status(), |report| {
-                at_ms = Some(report.at_ms);
-                Ok(())
-            });
-            bench.done(status, &mut io::sink())?;
-            taken.push(asked.elapsed());
-            if let Some(at_ms) = at_ms {
-                let here = began.elapsed().as_secs_f64() * 1e3;
-                least = least.min(here - f64::from(at_ms));
-            }
-        }
-        Ok::<f64, BenchError>(least)
-    };
-    let before = offset(bench)?;
-    let middle = Instant::now();
-    while middle.elapsed() < CLOCK {
-        bench.listen(&mut |_| ())?;
-    }
-    let after = offset(bench)?;
-    // a clock that is fast gains on this one
-    let ppm = (before - after) / CLOCK.as_secs_f64() * 1e3;
-    let seen = format!("{ppm:+.0} ppm against this PC's, {MAX_PPM:.0} allowed");
-    if ppm.abs() > EMULATED_PPM {
-        checks.look(
-            "clock",
-            "does not go in real time".to_owned(),
-            "an emulated board's time is not this PC's; a real board's clock would be broken",
-        );
-    } else if ppm.abs() > MAX_PPM {
-        let remedy = "the 8 MHz of the ST-LINK do not reach the chip: leave its half on the board, and its solder bridges (MCO to PH0) as delivered";
-        checks.bad("clock", seen, remedy);
-    } else {
-        checks.good("clock", seen);
+    for _ in 0..LOOKS {
+        let asked = Instant::now();
+        bench.get(Request::status())?;
+        taken.push(asked.elapsed());
     }
     taken.sort_unstable();
     let median = taken.get(taken.len() / 2).copied().unwrap_or_default();
     let longest = taken.last().copied().unwrap_or_default();
     let (damaged, missing) = bench.probe.losses();
     let seen = format!(
-        "an answer takes {:.1} ms, at most {:.1}; {}, {}",
+        "an answer takes {:.1} ms, at most {:.1}; {} damaged, {} lost",
         median.as_secs_f64() * 1e3,
         longest.as_secs_f64() * 1e3,
-        count(damaged, "frame") + " damaged",
-        count(missing, "report") + " lost",
+        count(damaged, "frame"),
+        count(missing, "report"),
     );
     if damaged + missing == 0 {
         checks.good("line", seen);

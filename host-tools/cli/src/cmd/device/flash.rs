@@ -61,7 +61,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             let status = command.status().context("probe-rs does not start")?;
             ensure!(
                 status.success(),
-                "probe-rs ended with {status}: is the board's USB plug at CN1, and no other program at its probe? LD4 must be lit"
+                "probe-rs ended with {status}: is the board's USB plug at CN1, and no other program at its probe? LD4 \
+                 must be lit"
             );
         }
     }
@@ -73,14 +74,16 @@ fn look_for_probe(program: &str) -> anyhow::Result<()> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => bail!(
             "probe-rs is not installed. Install it with
   cargo install probe-rs-tools --locked
-or as https://probe.rs/docs/getting-started/installation says. Without it: cargo xtask bundle, and see FLASHING.md there"
+or as https://probe.rs/docs/getting-started/installation says.
+Without it: cargo xtask bundle, and see FLASHING.md there"
         ),
         list => list.context("probe-rs does not start")?,
     };
     let said = String::from_utf8_lossy(&list.stdout);
     ensure!(
         list.status.success() && !said.contains("No debug probes"),
-        "no debug probe found. Plug the board's USB socket CN1 into this PC. On Linux the user needs the right to use it:
+        "no debug probe found. Plug the board's USB socket CN1 into this PC.
+On Linux the user needs the right to use it:
 https://probe.rs/docs/getting-started/probe-setup (udev rules)"
     );
     Ok(())

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::Context as _;
 use serde::Serialize;
-use tactus_core::explorer::Told;
+use tactus_core::explorer::VerdictKind;
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Status};
 use tactus_lab::eval::evaluate::Method;
@@ -146,10 +146,10 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
     }
     if let Some(canvas) = canvas {
         let figures = exploration.figures(args.stop.threshold)?;
-        canvas.write("tactus device identify", &figures, out)?;
+        canvas.write(&figures, out)?;
     }
-    Ok(match answered.map(|(verdict, _)| verdict.told()) {
-        Some(Told::Sure) => Done::Fully,
+    Ok(match answered.map(|(verdict, _)| verdict.kind()) {
+        Some(VerdictKind::Sure) => Done::Fully,
         _ => Done::NotIdentified,
     })
 }

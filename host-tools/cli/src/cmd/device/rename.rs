@@ -67,8 +67,9 @@ Examples:
   tactus device refresh                      asks for one texture after the other; s leaves one out
   tactus device refresh --backup old.tact    keeps the table of before in this file
 
-Calibrate first: the force has to be right. What all textures have in common moves all of them, also those that are left out; what
-a texture has of its own moves it by as much as one slide is to be believed. The book says more: Learning and teaching.")]
+Calibrate first: the force has to be right. What all textures have in common moves all of them, also those that are
+left out; what a texture has of its own moves it by as much as one slide is to be believed. The book says more:
+Learning and teaching.")]
 pub(crate) struct Refresh {
     #[command(flatten)]
     at: Where,
@@ -86,11 +87,13 @@ Examples:
   tactus device settings                        what is set
   tactus device settings --false-alarm 0.005    of known textures, one in 200 may be called new
   tactus device settings --as-table             what the table was learned for, 2 % unless `learn` was told otherwise
-  tactus device settings --high-force on        a rig may press with 2 N, if its finger yields or its lever is stopped before 2.2 N
+  tactus device settings --high-force on
+        a rig may press with 2 N, if its finger yields or its lever is stopped before 2.2 N
   tactus device settings --high-force off       1.26 N again
 
-The probe keeps both without power. The share of false alarms holds for the person at a handheld and for `identify`, `monitor` and
-`verify`, where these are not given a --false-alarm of their own. A handheld refuses --high-force: a person presses it.")]
+The probe keeps both without power. The share of false alarms holds for the person at a handheld and for `identify`,
+`monitor` and `verify`, where these are not given a --false-alarm of their own. A handheld refuses --high-force: a
+person presses it.")]
 pub(crate) struct Settings {
     #[command(flatten)]
     at: Where,

@@ -23,8 +23,8 @@ Examples:
   tactus device train burlap --same-spot    without asking to move the sample
 
 A slide on the same track again says little about a texture. So at a terminal the rig stops after each trial of all
-movements, its finger lifted, and you are asked to move or turn the sample. What came of that stands in the probe's table,
-for `tactus table` and `tactus report`.")]
+movements, its finger lifted, and you are asked to move or turn the sample. What came of that stands in the probe's
+table, for `tactus table` and `tactus report`.")]
 pub(crate) struct Train {
     #[command(flatten)]
     at: Where,
@@ -33,7 +33,8 @@ pub(crate) struct Train {
     /// Trials of each movement, those of an unfinished training included
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..))]
     trials: u8,
-    /// Make all movements of the grid up to 1.26 N, or 2 N where that is set, instead of the table's, to find out which tell textures apart
+    /// Make all movements of the grid up to 1.26 N, or 2 N where that is set, instead of the table's, to find out which
+    /// tell textures apart
     #[arg(long)]
     pilot: bool,
     /// Where on the sample slides begin; drawn anew unless given

@@ -21,8 +21,8 @@ Examples:
   tactus device verify cork                        the same, different, or not sure yet
   tactus device verify cork --false-alarm 0.005    of its own slides, one in 200 may be called different
 
-The probe slides until it is sure, --max-slides at most. Its go / no-go output is high from the answer \"the same\" until the
-next `verify` begins. Exit code: 0 the same, 3 different or not sure.")]
+The probe slides until it is sure, --max-slides at most. Its go / no-go output is high from the answer \"the same\"
+until the next `verify` begins. Exit code: 0 the same, 3 different or not sure.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,

@@ -18,26 +18,25 @@ use crate::cmd::textures::measure_folder;
 /// Play thousands of virtual explorations and count the right answers
 #[derive(clap::Args, Clone)]
 #[command(after_help = "\
-Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the method
-choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more probable
-than --threshold, or after --max-slides.
+Every run learns from slides drawn anew (--protocol says from which), takes one texture as unknown and lets the
+method choose; each slide it asks for is drawn from the test slides of that texture. It stops when a texture is more
+probable than --threshold, or after --max-slides.
 
-First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none of those
-I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
-exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the known
-ones and slides are drawn with replacement, as in the paper.
+First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none
+of those I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide
+comes twice, and the exploration ends when the recordings run out. Then come the figures of explorations in which it
+must be one of the known ones and slides are drawn with replacement, as in the paper.
 
-With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is train or
-validate, and an action is any (movement, property) pair.
+With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is
+train or validate, and an action is any (movement, property) pair.
 
-With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and tested on
-the other.
+With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and
+tested on the other.
 
---novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a known one
-is taken for new.
---verify holds the slides of each texture against its own reference and against those of three others, as `tactus verify`
-does, and counts the errors: at the limits, and where both are equal.
-These need the method fused.
+--novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a
+known one is taken for new. --verify holds the slides of each texture against its own reference and against those of
+three others, as `tactus verify` does, and counts the errors: at the limits, and where both are equal. These need the
+method fused.
 
 --plot draws what is told of each texture (confusion), or with --verify one error against the other (trade-off).
 
@@ -45,7 +44,6 @@ Examples:
   tactus evaluate --recordings DIR --protocol drift
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
-  tactus evaluate --recordings DIR --novelty leave-one-out --left-out 5     tables of all but five
   tactus evaluate --recordings DIR --plot pictures
   tactus evaluate --fabrics DIR
   tactus evaluate --recordings DIR --verify --protocol blocked")]
@@ -73,9 +71,6 @@ pub(crate) struct Args {
     /// Count how textures that were not learned are noticed
     #[arg(long, value_enum, conflicts_with = "plot")]
     pub(crate) novelty: Option<Novelty>,
-    /// With --novelty: textures that are left out of a table together
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "novelty", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) left_out: u16,
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with = "novelty")]
     pub(crate) verify: bool,

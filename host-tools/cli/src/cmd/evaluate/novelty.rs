@@ -20,8 +20,6 @@ struct NoveltyFigures {
     method: Method,
     protocol: &'static str,
     train_slides: usize,
-    /// Textures that were left out of a table together.
-    left_out: u16,
     runs: u64,
     seed: u64,
     #[serde(flatten)]
@@ -36,16 +34,13 @@ pub(crate) fn leave_one_out(
     config: Config,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
-    let together = usize::from(args.left_out);
-    // a texture that is known is presented while others are left out, and limits take three
-    let least = (2 * together).max(3 + together);
+    // a texture that is known is presented while another is left out, and limits take three
     ensure!(
-        experiment.names().len() >= least,
-        "--novelty needs {} or more to leave out {together}: record more of them",
-        count(least as u64, "texture")
+        experiment.names().len() >= 4,
+        "--novelty needs 4 textures or more: record more of them"
     );
     let novelty = with_progress(args.runs(), "presenting new textures", |done| {
-        novelty::leave_out(experiment, config, together, args.runs(), done)
+        novelty::leave_one_out(experiment, config, args.runs(), done)
     })?;
     let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
     if args.format == Format::Json {
@@ -53,20 +48,15 @@ pub(crate) fn leave_one_out(
             method: args.method,
             protocol,
             train_slides,
-            left_out: args.left_out,
             runs,
             seed,
             novelty,
         };
         return print_json(&figures, out);
     }
-    let who = match together {
-        1 => "Every texture left out in turn".to_owned(),
-        n => format!("{} left out together, in turn", count(n as u64, "texture")),
-    };
     writeln!(
         out,
-        "{who}, {protocol}, {}, {}, seed {seed}",
+        "Every texture left out in turn, {protocol}, {}, {}, seed {seed}",
         count(train_slides as u64, "training slide"),
         count(runs, "run")
     )?;
@@ -95,7 +85,6 @@ pub(crate) fn leave_one_out(
     Ok(())
 }
 
-/// Verdicts on one line.
 fn in_words(verdicts: &Verdicts) -> String {
     let words = verdict_rows(verdicts);
     let words = words.map(|(name, share, remark)| format!("{name} {:.1} %{remark}", share * 100.0));

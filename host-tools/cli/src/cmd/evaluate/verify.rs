@@ -56,7 +56,7 @@ pub(super) fn run(
     }
     if let Some(canvas) = canvas {
         let figure = trade_off::figure(&figures.verified.verify)?;
-        canvas.write("tactus evaluate --verify", &[figure], out)?;
+        canvas.write(&[figure], out)?;
     }
     Ok(())
 }

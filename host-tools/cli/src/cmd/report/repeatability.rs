@@ -77,7 +77,7 @@ pub(super) fn run(
         Format::Text => print(&gauged, out)?,
     }
     if let Some(canvas) = canvas {
-        canvas.write("Control charts", &charts(&gauged)?, out)?;
+        canvas.write(&charts(&gauged)?, out)?;
     }
     Ok(())
 }

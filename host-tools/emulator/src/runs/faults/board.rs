@@ -16,7 +16,7 @@ use tactus_lab::sim::fault_case::{
     Activity, Case, HOMINGS, LIFTED_N, Outcome, SHARE, STANDS_MM_S, STILL_MM, STILL_MS,
     frees_the_finger, world,
 };
-use tactus_lab::sim::press::FORCE_LIMIT_N;
+use tactus_lab::sim::rig::FORCE_LIMIT_N;
 use tactus_link::Request;
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;

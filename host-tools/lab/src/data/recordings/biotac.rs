@@ -171,7 +171,6 @@ impl Manifest {
         })
     }
 
-    /// The textures, and the slides of each.
     pub(super) fn contents(&self) -> (Vec<Texture>, Vec<Vec<SlideKey>>) {
         let key = |&(number, _): &(u32, usize)| SlideKey {
             number,

@@ -31,7 +31,6 @@ impl RecordingError {
         Self(format!("{}: {cause}", path.display()))
     }
 
-    /// A texture without a slide can be neither learned nor tested.
     pub(super) fn empty_texture(manifest: &Path, texture: &Texture) -> Self {
         let Texture { id, name } = texture;
         let cause =
@@ -39,7 +38,6 @@ impl RecordingError {
         Self::at(manifest, cause)
     }
 
-    /// Of two slides with one number the order in time is unknown.
     pub(super) fn twice(manifest: &Path, place: &str, id: u32, number: u32) -> Self {
         let cause = format!(
             "{place}: slide {number} of texture {id} is listed twice; number the slides of a texture in the order of \

@@ -144,7 +144,6 @@ impl Manifest {
         Ok(Self { textures })
     }
 
-    /// The textures, and the slides of each.
     pub(super) fn contents(&self) -> (Vec<Texture>, Vec<Vec<SlideKey>>) {
         let key = |e: &Entry| SlideKey {
             number: e.number,

@@ -285,7 +285,6 @@ fn is_empty(folder: &Path) -> Result<bool> {
     Ok(names.all(|entry| entry.is_ok_and(|entry| entry.file_name() == PART)))
 }
 
-/// The columns, as they are written.
 fn header() -> Vec<String> {
     let columns = COLUMNS.into_iter().chain(LABELS);
     columns.map(str::to_owned).collect()
@@ -372,7 +371,6 @@ fn replace(folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
         .map_err(|e| io_error(&path, e))
 }
 
-/// A value in thousandths as a decimal number.
 fn thousandths(value: u32) -> String {
     format!("{}.{:03}", value / 1000, value % 1000)
 }

@@ -12,13 +12,13 @@ use super::{Finding, m};
 use crate::bringup::weights;
 
 /// How far P_DC may be from where it was in the air, counts: 92 mN.
-pub const AIR_COUNTS: f32 = 8.0;
+pub(crate) const AIR_COUNTS: f32 = 8.0;
 /// Most that a weight may be off the line, as a share of it.
-pub const OFF_LINE: f32 = 0.1;
+pub(crate) const OFF_LINE: f32 = 0.1;
 /// How far a mean speed may be from the one that was asked for, as a share.
 pub const SPEED_SHARE: f64 = 0.02;
 /// How far the stage may be from where its mean speed has it, mm: at the fastest a report may be 3 ms late.
-pub const UNEVEN_MM: f64 = 0.3;
+pub(crate) const UNEVEN_MM: f64 = 0.3;
 /// Reports of a run that are no steady speed, at each end: it takes 63 ms to its highest speed, and a report comes each
 /// 50 ms.
 const RAMP: usize = 3;

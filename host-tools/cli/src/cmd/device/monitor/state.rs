@@ -4,10 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use tactus_core::features::Movement;
-use tactus_core::table::Action;
-use tactus_core::wire::{
-    Command, Event, Live, PROTOCOL, Phase, Prompt, Report, SlideReport, Status,
-};
+use tactus_core::wire::{Command, Event, Live, PROTOCOL, Phase, Prompt, Report, Status};
 use tactus_lab::eval::show::count;
 
 /// P_AC samples that are shown: a second.
@@ -28,16 +25,6 @@ pub(crate) struct Note {
     pub(crate) text: String,
 }
 
-/// The movement that is made, and why.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Chosen {
-    pub(crate) slide: u8,
-    pub(crate) movement: Movement,
-    pub(crate) action: Action,
-    /// uncertainty that it should leave
-    pub(crate) leaves: Option<f32>,
-}
-
 pub(crate) struct Monitor {
     pub(crate) place: String,
     pub(crate) names: Vec<String>,
@@ -45,8 +32,8 @@ pub(crate) struct Monitor {
     pub(crate) at_ms: u32,
     pub(crate) live: Option<Live>,
     pub(crate) pac: VecDeque<i16>,
-    pub(crate) chosen: Option<Chosen>,
-    pub(crate) observed: Option<SlideReport>,
+    /// the one that is made
+    pub(crate) movement: Option<Movement>,
     pub(crate) posterior: Vec<f32>,
     pub(crate) answer: Option<String>,
     pub(crate) notes: VecDeque<Note>,
@@ -72,8 +59,7 @@ impl Monitor {
             at_ms: 0,
             live: None,
             pac: VecDeque::new(),
-            chosen: None,
-            observed: None,
+            movement: None,
             posterior: Vec::new(),
             answer: None,
             notes: VecDeque::new(),
@@ -119,8 +105,7 @@ impl Monitor {
     }
 
     fn forget_exploration(&mut self) {
-        self.chosen = None;
-        self.observed = None;
+        self.movement = None;
         self.posterior.clear();
         self.answer = None;
     }
@@ -175,32 +160,19 @@ impl Monitor {
                 let recovery = fault.recovery();
                 self.note(Weight::Fault, format!("{fault}: {recovery} (key h)"));
             }
-            &Event::Chosen {
-                slide,
-                movement,
-                action,
-                ref expected,
+            Event::Chosen {
+                slide, movement, ..
             } => {
-                if slide == 1 {
+                if *slide == 1 {
                     self.posterior.clear();
                     self.answer = None;
-                    self.observed = None;
                 }
-                let outcome = expected.iter().find(|outcome| outcome.action == action);
-                self.chosen = Some(Chosen {
-                    slide,
-                    movement,
-                    action,
-                    leaves: outcome.map(|outcome| outcome.uncertainty),
-                });
+                self.movement = Some(*movement);
+                self.note(Weight::Message, format!("slide {slide}: {movement}"));
             }
             Event::SlideReport {
-                slide,
-                observed,
-                posterior,
-                ..
+                slide, posterior, ..
             } => {
-                self.observed = Some(observed.clone());
                 self.posterior = posterior.to_vec();
                 if let Some((p, texture)) = self.ranked().first().copied() {
                     let (name, p) = (self.name(texture), p * 100.0);

@@ -108,18 +108,19 @@ fn exploration() -> Vec<Event> {
 fn a_slide_looks_like_this() {
     let screen = screen(&heard(exploration()), 80, 24);
     let golden = "\
-╭ Rig ─────────────────╮╭ Slide 1 ───────────╮╭ What it may be ────────────────╮
-│phase   sliding       ││1.26 N, 10.0 mm/s   ││Oak wood       ██████░░  75.0 % │
-│force   1.050 N       ││for roughness       ││Velcro         █░░░░░░░  15.0 % │
-│████████░░┃░░░░░ 2.1 N││to leave 12.5 %     ││Burlap         ░░░░░░░░   5.0 % │
-│speed    10.0 mm/s    ││last slide          ││Felt           ░░░░░░░░   5.0 % │
-│stage    31.3 mm      ││traction    0.512 N ││                                │
-│lever    1.00 mm      ││roughness   5.250   ││                                │
-│motor     132 mA      ││fineness        -   ││                                │
-╰──────────────────────╯╰────────────────────╯╰────────────────────────────────╯
+╭ Rig ─────────────────╮╭ What it may be ──────────────────────────────────────╮
+│phase   sliding       ││Oak wood                 ███████████████░░░░░  75.0 % │
+│force   1.050 N       ││Velcro                   ███░░░░░░░░░░░░░░░░░  15.0 % │
+│████████░░┃░░░░░ 2.1 N││Burlap                   █░░░░░░░░░░░░░░░░░░░   5.0 % │
+│speed    10.0 mm/s    ││Felt                     █░░░░░░░░░░░░░░░░░░░   5.0 % │
+│stage    31.3 mm      ││                                                      │
+│lever    1.00 mm      ││                                                      │
+│motor     132 mA      ││                                                      │
+╰──────────────────────╯╰──────────────────────────────────────────────────────╯
 ╭ Messages ────────────────────────────────────────────────────────────────────╮
+│0:00:01 slide 1: 1.26 N, 10.0 mm/s                                            │
 │0:00:03 slide 1: most likely Oak wood, 75.0 %                                 │";
-    assert_eq!(screen[10..21].join("\n"), golden);
+    assert_eq!(screen[10..22].join("\n"), golden);
     assert_eq!(
         screen[0],
         " Tactus  /dev/ttyACM0  4 textures (factory)            nothing lost, up 0:00:04"
@@ -175,51 +176,25 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
 }
 
 #[test]
-fn a_sine_is_a_peak_at_its_frequency() {
-    let mut events = Vec::new();
-    for number in 0..40u16 {
+fn a_trace_reaches_both_ends_of_its_scale() {
+    let blocks = (0..40u16).map(|number| {
         let sample = |n: u16| {
             let t = f64::from(number * 64 + n) / 2200.0;
             (200.0 * (std::f64::consts::TAU * 100.0 * t).sin()) as i16
         };
-        events.push(Event::Block(Block {
+        Event::Block(Block {
             number,
             still: false,
             steady: None,
             pac: (0..64).map(sample).collect(),
             shear_mn: Default::default(),
             lost: 0,
-        }));
-    }
-    let monitor = heard(events);
+        })
+    });
+    let monitor = heard(blocks);
     assert_eq!(monitor.pac.len(), SHOWN);
-    let screen = screen(&monitor, 80, 24);
-    let cells = |line: &str| line.chars().collect::<Vec<char>>();
-    let axis = screen.iter().find(|line| line.contains("1000 Hz")).unwrap();
-    let mark: Vec<char> = "100 ".chars().collect();
-    let hundred = cells(axis)
-        .windows(4)
-        .position(|cells| cells == mark)
-        .unwrap();
-    // the highest bar stands over the 100
-    let top = screen
-        .iter()
-        .skip(2)
-        .find(|line| cells(line)[41..79].iter().any(|c| ('▁'..='█').contains(c)))
-        .unwrap();
-    let peak = (41..79)
-        .find(|&column| ('▁'..='█').contains(&cells(top)[column]))
-        .unwrap();
-    assert!(
-        peak.abs_diff(hundred) <= 2,
-        "{peak} {hundred}\n{}",
-        screen.join("\n")
-    );
-    // and the trace reaches both ends of its scale
-    assert!(
-        screen.iter().any(|line| line.contains(" 256│"))
-            && screen.iter().any(|line| line.contains("-256│"))
-    );
+    let all = screen(&monitor, 80, 24).join("\n");
+    assert!(all.contains(" 256│") && all.contains("-256│"), "{all}");
 }
 
 #[test]
@@ -253,8 +228,8 @@ fn from_76_to_200_columns_nothing_lies_over_anything_else() {
             let losses = "line 12 damaged 345 lost, slots 0 late 0 lost";
             assert!(screen[0].ends_with(losses), "{all}");
             let corners = |corner| all.matches(corner).count();
-            assert_eq!((corners('╭'), corners('╯')), (6, 6), "{all}");
-            for part in ["P_AC", "Spectrum", "sliding", "Oak wood", "10.0 mm/s"] {
+            assert_eq!((corners('╭'), corners('╯')), (4, 4), "{all}");
+            for part in ["P_AC", "sliding", "Oak wood", "10.0 mm/s"] {
                 assert!(all.contains(part), "{width} x {height}: no {part}\n{all}");
             }
             let keys = &screen[usize::from(height) - 1];
@@ -289,7 +264,7 @@ fn keys_ask_for_what_they_say() {
 fn what_was_stopped_is_shown_no_more() {
     let mut monitor = heard(exploration());
     let shown = |monitor: &Monitor| screen(monitor, 80, 24)[..19].join("\n");
-    assert!(shown(&monitor).contains("Slide 1") && shown(&monitor).contains("Oak wood"));
+    assert!(shown(&monitor).contains("Oak wood"));
     monitor.asked(&Command::Stop);
     // reports of it are still on the line
     for event in exploration() {
@@ -300,10 +275,7 @@ fn what_was_stopped_is_shown_no_more() {
         });
     }
     let screen = shown(&monitor);
-    assert!(
-        !screen.contains("Slide 1") && !screen.contains("0.512"),
-        "{screen}"
-    );
+    assert!(!screen.contains("Oak wood"), "{screen}");
     assert!(screen.contains("i: find out"), "{screen}");
     monitor.asked(&Command::Identify(Default::default()));
     monitor.hear(&Report {
@@ -311,7 +283,7 @@ fn what_was_stopped_is_shown_no_more() {
         at_ms: 9500,
         event: exploration().remove(0),
     });
-    assert!(shown(&monitor).contains("Slide 1"));
+    assert!(shown(&monitor).contains("the rig makes the first slide"));
 }
 
 #[test]

@@ -1,14 +1,13 @@
-//! What the monitor looks like. Colours are the ones that colour-blind people tell apart (blue, orange, vermillion), and say
-//! nothing that is not also said in words.
+//! What the monitor looks like. Colours are the ones that colour-blind people tell apart (blue, orange, vermillion),
+//! and say nothing that is not also said in words.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph, Sparkline};
-use tactus_core::dsp::{BIN_HZ, Plan, SpectrumSum};
-use tactus_core::features::Property;
+use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph};
+use tactus_core::features::Movement;
 use tactus_core::wire::Phase;
 use tactus_lab::eval::show::count;
 use tactus_link::say::phase_name;
@@ -24,10 +23,6 @@ pub(super) const DIM: Color = Color::Indexed(245);
 
 /// The force guard trips here, N.
 const MOST_N: f32 = 2.1;
-/// The spectrum that is shown, Hz: the bands' range.
-const SPECTRUM_HZ: (f32, f32) = (17.0, 1000.0);
-/// And its power per bin: 1 to 10^6 counts^2.
-const SPECTRUM_DB: f32 = 60.0;
 /// Textures less probable than this are not listed.
 const WORTH_LISTING: f32 = 0.001;
 /// The lever's step, mm (the reference rig's).
@@ -46,7 +41,7 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
         frame.render_widget(Paragraph::new(text), area);
         return;
     }
-    let [header, charts, panels, notes, keys] = Layout::vertical([
+    let [header, trace, panels, notes, keys] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Min(6),
         Constraint::Length(9),
@@ -54,18 +49,11 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
         Constraint::Length(1),
     ])
     .areas(area);
-    let [trace, spectrum] = Layout::horizontal([Constraint::Fill(1); 2]).areas(charts);
-    let [rig, slide, textures] = Layout::horizontal([
-        Constraint::Length(24),
-        Constraint::Length(22),
-        Constraint::Fill(1),
-    ])
-    .areas(panels);
+    let [rig, textures] =
+        Layout::horizontal([Constraint::Length(24), Constraint::Fill(1)]).areas(panels);
     draw_header(monitor, frame, header);
     draw_trace(monitor, frame, trace);
-    draw_spectrum(monitor, frame, spectrum);
     draw_rig(monitor, frame, rig);
-    draw_slide(monitor, frame, slide);
     draw_textures(monitor, frame, textures);
     draw_notes(monitor, frame, notes);
     let spans = KEYS.map(|(key, what)| {
@@ -160,47 +148,6 @@ fn draw_trace(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     frame.render_widget(chart, area);
 }
 
-fn draw_spectrum(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
-    let (title, color) = match (monitor.is_sampling(), monitor.pac.is_empty()) {
-        (true, _) | (_, true) => (format!(" Spectrum, 0 to {SPECTRUM_DB} dB "), ORANGE),
-        (false, false) => (" Its spectrum, 0 to 60 dB ".to_owned(), DIM),
-    };
-    let block = panel(title);
-    let inner = block.inner(area);
-    frame.render_widget(block, area);
-    let [bars, axis] = Layout::vertical([Constraint::Min(1), Constraint::Length(1)]).areas(inner);
-    let pac: Vec<i16> = monitor.pac.iter().copied().collect();
-    let mut sum = SpectrumSum::default();
-    sum.push(&Plan::new(), &pac);
-    let (low, high) = SPECTRUM_HZ;
-    // columns are equal ratios of frequency
-    let hz = |column: u16| low * (high / low).powf(f32::from(column) / f32::from(inner.width));
-    if let Some(spectrum) = sum.finish() {
-        let power = |column: u16| {
-            let first = (hz(column) / BIN_HZ) as usize;
-            let end = (hz(column + 1) / BIN_HZ) as usize;
-            spectrum.band(first..end.max(first + 1))
-        };
-        let height: Vec<u64> = (0..inner.width)
-            .map(|column| (power(column).max(1.0).log10() * 10.0) as u64)
-            .collect();
-        let line = Sparkline::default().data(height).max(SPECTRUM_DB as u64);
-        frame.render_widget(line.fg(color), bars);
-    }
-    let end = "1000 Hz";
-    let space = usize::from(inner.width) - end.len();
-    let mut labels = String::new();
-    for mark in [17.0f32, 50.0, 100.0, 200.0, 500.0] {
-        let at = (mark / low).ln() / (high / low).ln() * f32::from(inner.width);
-        let (at, mark) = (at as usize, mark.to_string());
-        // one that would touch its neighbour is left out
-        if (labels.is_empty() || at > labels.len()) && at + mark.len() < space {
-            labels = format!("{labels:<at$}{mark}");
-        }
-    }
-    frame.render_widget(Line::from(dim(format!("{labels:<space$}{end}"))), axis);
-}
-
 /// "force   0.998 N"
 fn row(name: &str, value: String) -> Line<'static> {
     Line::from(vec![dim(format!("{name:<7} ")), Span::from(value)])
@@ -221,7 +168,7 @@ fn draw_rig(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     match &monitor.live {
         Some(live) => {
             let force_n = f32::from(live.force_mn) * 1e-3;
-            let wanted_n = monitor.chosen.map(|c| c.movement.force_n());
+            let wanted_n = monitor.movement.map(Movement::force_n);
             let mm = live.stage_um as f32 * 1e-3;
             let mm_s = live.speed_um_s as f32 * 1e-3;
             let lever_mm = live.steps as f32 * STEP_MM;
@@ -269,39 +216,6 @@ fn gauge(force_n: f32, wanted_n: Option<f32>, width: u16) -> Line<'static> {
     ])
 }
 
-fn draw_slide(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
-    let mut title = " Slide ".to_owned();
-    let mut lines = Vec::new();
-    if let Some(chosen) = monitor.chosen {
-        title += &format!("{} ", chosen.slide);
-        let property = chosen.action.property;
-        let looked_at = property.map_or("all features", Property::name);
-        let leaves = chosen
-            .leaves
-            .map(|leaves| format!("to leave {:.1} %", leaves * 100.0));
-        lines.extend([
-            Line::from(chosen.movement.to_string()),
-            Line::from(dim(format!("for {looked_at}"))),
-            leaves.map_or_else(Line::default, |leaves| Line::from(dim(leaves))),
-        ]);
-    }
-    if let Some(observed) = &monitor.observed {
-        lines.push(Line::from(dim("last slide")));
-        lines.extend(Property::ALL.map(|property| {
-            let unit = if property == Property::Traction {
-                " N"
-            } else {
-                ""
-            };
-            let value = observed.properties().get(property);
-            let value = value.map_or("     -".to_owned(), |value| format!("{value:6.3}{unit}"));
-            let name = dim(format!("{:<10} ", property.name()));
-            Line::from(vec![name, Span::from(value)])
-        }));
-    }
-    frame.render_widget(Paragraph::new(lines).block(panel(title)), area);
-}
-
 fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let block = panel(" What it may be ");
     let inner = block.inner(area);
@@ -316,7 +230,7 @@ fn draw_textures(monitor: &Monitor, frame: &mut Frame<'_>, area: Rect) {
     let bar_width = width.saturating_sub(name_width + 10);
     let ranked = monitor.ranked();
     if ranked.is_empty() {
-        let hint = if monitor.chosen.is_some() {
+        let hint = if monitor.movement.is_some() {
             "the rig makes the first slide ..."
         } else {
             "i: find out what lies under the finger"

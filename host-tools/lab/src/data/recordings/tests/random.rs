@@ -1,7 +1,6 @@
 //! Random samples, and random damage.
 use proptest::prelude::*;
 
-use super::biotac_layout::biotac;
 use super::*;
 
 proptest! {

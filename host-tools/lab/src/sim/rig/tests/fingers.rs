@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::sim::collection::{Collection, calibrated, texture_name};
 use crate::sim::handheld;
-use crate::sim::rig::{Performed, SimError, SimRig};
+use crate::sim::rig::{SimError, SimRig};
 use embassy_futures::block_on;
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;

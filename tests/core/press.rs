@@ -9,8 +9,8 @@ use tactus_core::features::Movement;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Ended, Phase};
 
-use super::collection::{Collection, texture_name};
-use super::rig::{SimError, SimRig};
+use tactus_lab::sim::collection::{Collection, texture_name};
+use tactus_lab::sim::rig::{FORCE_LIMIT_N, SimError, SimRig};
 use tactus_world::conditions::Conditions;
 use tactus_world::faults::Fault as Cause;
 use tactus_world::maths::pow;
@@ -19,8 +19,6 @@ use tactus_world::noise::Noise;
 use tactus_world::textures;
 use tactus_world::world::Setup;
 
-/// Largest force that the finger ever bears, N.
-pub const FORCE_LIMIT_N: f64 = 2.2;
 /// Textures of each world: the softest, the stiffest, and others by its seed.
 const TEXTURES: usize = 10;
 const STREAM: u64 = 0x9e55;
@@ -28,10 +26,8 @@ const STREAM: u64 = 0x9e55;
 /// neither signal, as the book's page of limits says.
 const LEAK_S: (f64, f64) = (0.1, 50.0);
 
-/// Faults of P_DC.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Trouble {
-    /// Nothing.
+pub(crate) enum Trouble {
     Sound,
     /// It is dead before the lever comes down.
     Dead,
@@ -42,8 +38,7 @@ pub enum Trouble {
 }
 
 impl Trouble {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Sound, Self::Dead, Self::Dying, Self::Leaking];
+    pub(crate) const ALL: [Self; 4] = [Self::Sound, Self::Dead, Self::Dying, Self::Leaking];
 
     /// A cause, and the share of the wanted force at which it comes.
     fn draw(self, noise: &mut Noise) -> Option<(Cause, f64)> {
@@ -68,41 +63,32 @@ impl Trouble {
     }
 }
 
-/// A rig of the campaign: it makes every movement of the grid on one texture. All of it can be made again from this.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Bench {
+pub(crate) struct Bench {
     /// The world's seed.
-    pub world: u64,
-    /// Number of the texture.
-    pub texture: u8,
-    /// The fault.
-    pub trouble: Trouble,
-    /// Guards that are switched off.
-    pub unguarded: Unguarded,
+    pub(crate) world: u64,
+    pub(crate) texture: u8,
+    pub(crate) trouble: Trouble,
+    pub(crate) unguarded: Unguarded,
     /// The finger's mount.
-    pub mount: Mount,
+    pub(crate) mount: Mount,
 }
 
-/// One press and its slide.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Press {
-    /// The rig.
-    pub bench: Bench,
+pub(crate) struct Press {
+    pub(crate) bench: Bench,
     /// Seed of its trial.
-    pub seed: u64,
-    /// The movement.
-    pub movement: Movement,
+    pub(crate) seed: u64,
+    pub(crate) movement: Movement,
     /// The fault, and its share of the movement's force.
-    pub cause: Option<(Cause, f64)>,
+    pub(crate) cause: Option<(Cause, f64)>,
     /// Largest force by the world's own reckoning, until the finger was lifted, N.
-    pub force_max_n: f64,
-    /// The end of the movement.
-    pub ended: Result<Ended, SimError>,
+    pub(crate) force_max_n: f64,
+    pub(crate) ended: Result<Ended, SimError>,
 }
 
 impl Press {
-    /// Returns true if the finger bore too much force.
-    pub fn is_too_hard(&self) -> bool {
+    pub(crate) fn is_too_hard(&self) -> bool {
         self.force_max_n > FORCE_LIMIT_N
     }
 }
@@ -132,20 +118,17 @@ impl fmt::Display for Press {
     }
 }
 
-/// The rigs to run.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Campaign {
+pub(crate) struct Campaign {
     /// Seeds of the worlds.
-    pub worlds: RangeInclusive<u64>,
+    pub(crate) worlds: RangeInclusive<u64>,
     /// Every so-manieth rig; 1 is all. An odd number, no multiple of 5, comes to all textures and troubles.
-    pub every: usize,
-    /// Guards that are switched off.
-    pub unguarded: Unguarded,
+    pub(crate) every: usize,
+    pub(crate) unguarded: Unguarded,
 }
 
 impl Campaign {
-    /// The rigs.
-    pub fn benches(&self) -> Vec<Bench> {
+    pub(crate) fn benches(&self) -> Vec<Bench> {
         let mut benches = Vec::new();
         for world in self.worlds.clone() {
             for texture in textures_of(world) {
@@ -164,7 +147,7 @@ impl Campaign {
     }
 
     /// Makes all presses, rigs side by side; `done` is called after each rig.
-    pub fn run(&self, done: impl Fn() + Sync) -> Vec<Press> {
+    pub(crate) fn run(&self, done: impl Fn() + Sync) -> Vec<Press> {
         let presses = self.benches().into_par_iter().flat_map_iter(|bench| {
             let presses = bench.run();
             done();
@@ -192,13 +175,12 @@ fn textures_of(world: u64) -> Vec<u8> {
 }
 
 impl Bench {
-    /// Makes every movement of the grid.
-    pub fn run(&self) -> Vec<Press> {
+    pub(crate) fn run(&self) -> Vec<Press> {
         self.make(Movement::grid())
     }
 
     /// Makes these movements; high forces are allowed.
-    pub fn make(&self, movements: impl IntoIterator<Item = Movement>) -> Vec<Press> {
+    pub(crate) fn make(&self, movements: impl IntoIterator<Item = Movement>) -> Vec<Press> {
         let number = Trouble::ALL.iter().position(|t| *t == self.trouble);
         let collection = Collection {
             seed: self.world,
@@ -230,7 +212,7 @@ impl Bench {
 }
 
 /// Makes one movement, on a rig that is repaired before it; the cause comes at a share of the movement's force.
-pub fn make(
+pub(crate) fn make(
     rig: &mut SimRig,
     movement: Movement,
     cause: Option<(Cause, f64)>,
