@@ -2,8 +2,6 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-pub mod numpy;
-
 /// The folder of test data `name` ("biotac", "worlds"): below `TACTUS_DATA`, else below `../shared/data`.
 ///
 /// Where it is missing the test is to return: the skip is written to the file that `TACTUS_SKIP_LOG` names (xtask lists

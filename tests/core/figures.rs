@@ -12,9 +12,7 @@ use tactus_lab::eval::evaluate::{Method, Summary, evaluate, explorer};
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::novelty::leave_one_out;
 use tactus_study::fabricslide::FabricSet;
-use tactus_tests::{data, numpy, skipped};
-
-const RUNS: u64 = 8000;
+use tactus_tests::{count, data};
 
 fn summary(experiment: &Experiment, method: Method, runs: u64) -> Summary {
     let config = Config {
@@ -82,7 +80,7 @@ fn recorded_slides_give_the_reference_figures() {
             .into_iter()
             .zip(reference)
         {
-            let s = summary(&experiment, method, RUNS);
+            let s = summary(&experiment, method, count(8000, 4000));
             let what = format!("{protocol:?}, {train_slides} training slides, {method:?}");
             println!(
                 "{what}: {:.3} (reference {accuracy}), median {}",
@@ -119,7 +117,7 @@ fn property_worlds_give_the_reference_figures() {
             (117, 3, 5)
         );
         for (method, (accuracy, median)) in [(Method::Paper, paper), (Method::Random, random)] {
-            let s = summary(&experiment, method, 4000);
+            let s = summary(&experiment, method, count(4000, 2000));
             println!(
                 "world {world}, {method:?}: {:.3} (reference {accuracy}), median {}",
                 s.accuracy, s.median_slides
@@ -131,35 +129,6 @@ fn property_worlds_give_the_reference_figures() {
             );
             assert_eq!(s.median_slides, median, "world {world}, {method:?}");
         }
-    }
-}
-
-/// The same exploration written for numpy, without a fixed point or the core's kernels.
-#[test]
-fn numpy_finds_the_same_in_the_worlds() {
-    let Some(folder) = data("worlds") else { return };
-    for world in 1..=3 {
-        let file = folder.join(format!("world_{world}.csv"));
-        let numpy = match numpy::evaluate(&file, RUNS) {
-            Ok(found) => found,
-            Err(why) => return skipped(why),
-        };
-        let set = PropertyTable::read(&file).unwrap();
-        let s = summary(
-            &Experiment::given(&set, None, 1).unwrap(),
-            Method::Paper,
-            RUNS,
-        );
-        println!("world {world}: {:.4}, {numpy:?}", s.accuracy);
-        // four standard errors of the difference of two such shares
-        for (is, numpys) in [(s.accuracy, numpy.accuracy), (s.converged, numpy.sure)] {
-            let error = 4.0 * (2.0 * numpys * (1.0 - numpys) / RUNS as f64).sqrt();
-            assert!(
-                (is - numpys).abs() <= error,
-                "world {world}: {is} for {numpys}"
-            );
-        }
-        assert_eq!(s.median_slides, numpy.median);
     }
 }
 
@@ -199,7 +168,7 @@ fn the_fused_method_is_right_when_it_is_sure() {
             &recorded(&folder, protocol, train_slides),
             Method::Fused,
             // each learns and calibrates a table; all 8000 are the book's, by `tactus evaluate`
-            2000,
+            count(2000, 500),
         );
         println!(
             "{protocol:?}, {train_slides} training slides, fused: {:.4}, wrong among the sure {:.4}, median {}",
@@ -226,7 +195,7 @@ fn all_properties_of_a_slide_tell_the_worlds_apart() {
         .map(|world| {
             let set = PropertyTable::read(&folder.join(format!("world_{world}.csv"))).unwrap();
             let experiment = Experiment::given(&set, None, 1).unwrap();
-            let s = summary(&experiment, Method::StudentAll, 4000);
+            let s = summary(&experiment, Method::StudentAll, count(4000, 1000));
             println!(
                 "world {world}, student-all: {:.3}, wrong among the sure {:.3}, median {}",
                 s.accuracy, s.wrong_when_sure, s.median_slides
@@ -248,7 +217,7 @@ fn choosing_among_fifteen_movements_pays_on_fabrics() {
     let set = FabricSet::open(&folder).unwrap();
     let experiment = set.experiment(0, 1).unwrap();
     let [fused, cycle, paper] = [Method::Fused, Method::FusedCycle, Method::Paper].map(|method| {
-        let s = summary(&experiment, method, 2000);
+        let s = summary(&experiment, method, count(2000, 1000));
         println!("{method:?}: {:.3}, mean {:.2}", s.accuracy, s.mean_slides);
         s
     });
@@ -264,7 +233,7 @@ fn new_materials_are_noticed_and_a_session_is_followed() {
         ..Config::default()
     };
     let interleaved = recorded(&folder, Protocol::Interleaved, 5);
-    let after = leave_one_out(&interleaved, config, 2000, || ()).unwrap();
+    let after = leave_one_out(&interleaved, config, count(2000, 500), || ()).unwrap();
     println!("{after:?}");
     let told = (after.verdicts_new, after.verdicts_known);
     let after = after.novelty;

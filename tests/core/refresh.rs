@@ -99,7 +99,7 @@ fn slides(world: &Collection, table: Table<'_>, finger: Finger, count: usize) ->
 #[test]
 fn one_slide_of_each_texture_brings_most_of_a_replaced_fingers_table_back() {
     let mut sums = [0.0; 5];
-    let count = count(50, 2);
+    let count = count(50, 1);
     for seed in 5..5 + count {
         let world = world(seed);
         let calibration = |finger_seed| {
