@@ -195,7 +195,7 @@ fn features(
             shear_rate_hz,
         };
         let cut = recording.cut(&still.unwrap_or_default(), pac, shear.as_deref());
-        let cut = cut.map_err(|why| SlideError::new_err(sentence(&why)))?;
+        let cut = cut.map_err(SlideError::new_err)?;
         let mut measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
         measurement.pdc = measurement.pdc.filter(|_| pdc.is_some());
         Ok(Features {
