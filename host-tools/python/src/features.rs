@@ -10,7 +10,7 @@ use tactus_core::features::{Measurement, Movement, Observation, Property};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::replay::{MeasuredSlide, measure};
 
-use crate::error::{Raise as _, SlideError, sentence};
+use crate::error::{Raise as _, SlideError};
 use crate::values::array;
 
 /// What one slide measures.
