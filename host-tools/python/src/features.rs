@@ -10,7 +10,7 @@ use tactus_core::features::{Measurement, Movement, Observation, Property};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::replay::{MeasuredSlide, measure};
 
-use crate::error::{Raise as _, SlideError, sentence};
+use crate::error::{Raise as _, SlideError};
 use crate::values::array;
 
 /// What one slide measures.
@@ -195,7 +195,7 @@ fn features(
             shear_rate_hz,
         };
         let cut = recording.cut(&still.unwrap_or_default(), pac, shear.as_deref());
-        let cut = cut.map_err(|why| SlideError::new_err(sentence(&why)))?;
+        let cut = cut.map_err(SlideError::new_err)?;
         let mut measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
         measurement.pdc = measurement.pdc.filter(|_| pdc.is_some());
         Ok(Features {

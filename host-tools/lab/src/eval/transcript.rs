@@ -57,12 +57,13 @@ pub struct Answer {
     /// `sure`, `changed`, `new` or `undecided`.
     pub told: &'static str,
     /// The most probable texture; it is the answer with `sure`, and with `changed` if the user says so.
-    texture: String,
+    pub texture: String,
     /// Its posterior probability, 0 to 1.
-    probability: f32,
+    pub probability: f32,
     /// Log-odds that it is none of those known, where the method can tell.
     log_odds: Option<f32>,
-    slides: u8,
+    /// Slides that counted.
+    pub slides: u8,
 }
 
 impl Answer {
