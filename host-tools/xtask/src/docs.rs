@@ -2,7 +2,8 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 
-use crate::shell::{cargo, root, run, target};
+use crate::emulate::workspace;
+use crate::shell::{root, run, target};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -43,15 +44,8 @@ fn parts(write: bool) -> Result<()> {
     // outputs and plots are made from the recordings that one of the tests writes
     let all = ["book::the_recordings", "book::"];
     for filter in &all[usize::from(!write)..] {
-        let mut test = cargo();
-        test.args([
-            "test",
-            "--package",
-            "tactus-probe",
-            "--test",
-            "documents",
-            filter,
-        ]);
+        let mut test = workspace("test");
+        test.args(["--test", "documents", filter]);
         if write {
             // one after the other: two of them may write one page
             test.env("TACTUS_BOOK", "write")

@@ -4,6 +4,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::emulate;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain::rustflags;
 
@@ -42,9 +43,9 @@ pub(crate) fn check() -> Result<()> {
     tests.env("TACTUS_COMMAND", command);
     run(tests.env("PYTHONDONTWRITEBYTECODE", "1"))?;
     println!("== a session with a probe in software");
-    let mut session = cargo();
+    let mut session = emulate::workspace("test");
     // as the step of the tests has built it
-    session.args(["test", "--workspace", "--test", "command"]);
+    session.args(["--test", "command"]);
     session
         .args(["--", "device::package::"])
         .env("TACTUS_PYTHON", python);

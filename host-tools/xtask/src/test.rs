@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 
-use crate::emulate::workspace;
+use crate::emulate::{emulator, workspace};
 use crate::shell::{SKIP_LOG, cargo, has_subcommand, hear, root, run, target};
 use crate::toolchain::{self, CHIP};
 use crate::{bench, emulate, firmware, page, python, size};
@@ -21,8 +21,9 @@ const ROWS: [&[Step]; 2] = [
     &[
         ("formatting", formatting),
         ("lints", lints),
-        ("tests", all_tests),
+        ("tests", || tests(workspace("test").arg("--no-fail-fast"))),
         ("documentation", documentation),
+        ("board", board),
     ],
     &[
         ("firmware", firmware::build_all),
@@ -49,7 +50,9 @@ fn formatting() -> Result<()> {
 }
 
 fn lints() -> Result<()> {
-    announce(workspace("clippy").args(["--all-targets", "--", "-Dwarnings"]))
+    let lints = ["--all-targets", "--", "-Dwarnings"];
+    announce(workspace("clippy").args(lints))?;
+    announce(emulator("clippy").args(lints))
 }
 
 fn documentation() -> Result<()> {
@@ -67,12 +70,10 @@ fn licences() -> Result<()> {
     announce(cargo().args(["deny", "check", "bans", "licenses", "sources"]))
 }
 
-/// The tests of the whole workspace, those of the board with the images that would be flashed.
-fn all_tests() -> Result<()> {
-    announce(workspace("test").arg("--no-run"))?;
-    let mut all = workspace("test");
-    all.arg("--no-fail-fast");
-    tests(emulate::with_images(&mut all, &firmware::elves()?)?)
+fn board() -> Result<()> {
+    let mut board_tests = emulator("test");
+    board_tests.arg("--no-fail-fast");
+    tests(emulate::with_images(&mut board_tests, &firmware::elves()?)?)
 }
 
 fn announce(command: &mut Command) -> Result<()> {

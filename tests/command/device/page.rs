@@ -159,16 +159,15 @@ fn a_page_says_what_the_command_says() {
     let of = |what: &'static str| found.happened.iter().filter(move |one| one["what"] == what);
     assert_eq!(of("verdict").count(), 1, "{}", found.said);
     assert!(of("slide").count() > 0 && of("slide").all(|slide| slide["place"].is_array()));
-    // the log that the page keeps is one of the command's, which decides the same again and says it in the same words
+    // the log that the page keeps is one of the command's, which decides the same again
     let log = page.ask(&json!({"do": "log"}));
     bench.at.write("log", bytes(&log["files"][0]));
     let replayed = bench.at.printed("device log log");
-    let answers = found.said.lines().filter(|line| line.starts_with("It is"));
-    let last = answers
-        .clone()
-        .rfind(|line| line.contains("after"))
-        .expect(&found.said);
-    assert_says(&replayed, &[last.split(" after ").next().unwrap()]);
+    let told = found.said.lines().rfind(|line| line.starts_with("It is "));
+    let name = told.unwrap().trim_start_matches("It is ");
+    let name = name.split(": ").next().unwrap();
+    let same = format!(": {name}: the same here");
+    assert_says(&replayed, &[&same, "Every decision is the same here"]);
     drop(page);
     // the same words of settings, too
     let (mut page, _) = Page::new(&bench.port);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::build::{CRATE, build};
-use crate::shell::{cargo, root, run, skip, target};
+use crate::shell::{root, run, skip, target};
 use crate::toolchain::{self, BROWSER};
 use crate::{emulate, firmware};
 
@@ -107,9 +107,9 @@ impl Probe {
         let file = target().join("page-probe");
         // of an earlier one
         let _ = std::fs::remove_file(&file);
-        let mut serves = cargo();
+        let mut serves = emulate::workspace("test");
         // as the step of the tests has built it
-        serves.args(["test", "--workspace", "--test", "command", "--"]);
+        serves.args(["--test", "command", "--"]);
         serves.args(["device::page::serves_a_page", "--exact", "--nocapture"]);
         serves.env("TACTUS_PAGE_PORT", &file).stdin(Stdio::piped());
         let child = serves.spawn().context("cannot start cargo")?;
@@ -163,16 +163,8 @@ impl Probe {
 /// Runs a test that leaves something for the page, as the step of the tests has built it: the path of that.
 fn left_by(binary: &str, test: &str, variable: &str, name: &str) -> Result<PathBuf> {
     let path = target().join(name);
-    let mut tests = cargo();
-    tests.args([
-        "test",
-        "--workspace",
-        "--test",
-        binary,
-        "--",
-        test,
-        "--exact",
-    ]);
+    let mut tests = emulate::workspace("test");
+    tests.args(["--test", binary, "--", test, "--exact"]);
     run(tests.env(variable, &path))?;
     Ok(path)
 }
