@@ -260,7 +260,7 @@ fn a_second_folder_brings_the_test_slides() {
             .nth(2)
             .unwrap()
             .parse()
-            .is_ok_and(|n: u32| n % 3 == 0)
+            .is_ok_and(|n: u32| n.is_multiple_of(3))
     };
     let is_head = |line: &str| line.starts_with("texture");
     at.recordings("train", |line| (!third(line)).then(|| line.to_owned()));

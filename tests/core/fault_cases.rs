@@ -31,11 +31,11 @@ fn case(seed: u64, activity: Activity, texture: u8, faults: &[(u64, Fault)]) -> 
     }
 }
 
-fn right(outcome: Outcome) -> Result<(), Outcome> {
+fn right(outcome: Outcome) -> Result<(), Box<Outcome>> {
     if outcome.wrong.is_empty() {
         Ok(())
     } else {
-        Err(outcome)
+        Err(outcome.into())
     }
 }
 

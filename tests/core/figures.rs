@@ -80,7 +80,7 @@ fn recorded_slides_give_the_reference_figures() {
             .into_iter()
             .zip(reference)
         {
-            let s = summary(&experiment, method, count(8000, 4000));
+            let s = summary(&experiment, method, 8000);
             let what = format!("{protocol:?}, {train_slides} training slides, {method:?}");
             println!(
                 "{what}: {:.3} (reference {accuracy}), median {}",

@@ -89,7 +89,7 @@ pub struct Mems {
 
 impl Mems {
     /// Creates the state before the first read.
-    pub const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             z: [0; TAPS],
             came: 0,

@@ -223,10 +223,8 @@ impl Monitor {
                 let over = self.pac.len().saturating_sub(SHOWN);
                 self.pac.drain(..over);
             }
-            Event::Prompt(prompt) => {
-                if self.prompt.replace(*prompt) != Some(*prompt) {
-                    self.note(Weight::Message, format!("the display says: {prompt}"));
-                }
+            Event::Prompt(prompt) if self.prompt.replace(*prompt) != Some(*prompt) => {
+                self.note(Weight::Message, format!("the display says: {prompt}"));
             }
             _ => {}
         }
