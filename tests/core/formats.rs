@@ -1,5 +1,6 @@
-//! Tables, stores, messages, logs and recordings of version 1: each has the bytes of its golden file, and any other version
-//! is refused with a word on what to do. `docs/src/wire.md` says when golden files may be written anew, by `TACTUS_GOLDEN=write`.
+//! Tables, stores, messages, logs and recordings of version 1: each has the bytes of its golden file, and any other
+//! version is refused with a word on what to do. `docs/src/wire.md` says when golden files may be written anew, by
+//! `TACTUS_GOLDEN=write`.
 
 use std::fmt::Debug;
 use std::fs;

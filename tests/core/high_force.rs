@@ -1,5 +1,5 @@
-//! Movements of up to 2 N, for a rig whose finger's mount yields, judged by the world's force on the finger. That they have to be
-//! allowed first: `probe::tests::a_high_force_holds_only_where_it_is_kept`.
+//! Movements of up to 2 N, for a rig whose finger's mount yields, judged by the world's force on the finger. That they
+//! have to be allowed first: `probe::tests::a_high_force_holds_only_where_it_is_kept`.
 
 use rayon::prelude::*;
 use tactus_core::features::Movement;

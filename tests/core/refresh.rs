@@ -142,7 +142,8 @@ fn one_slide_of_each_texture_brings_most_of_a_replaced_fingers_table_back() {
     }
     let [before, replaced, refreshed, half, three] = sums;
     println!(
-        "right: {before:.3} before, {replaced:.3} replaced, {refreshed:.3} refreshed, {half:.3} half of them, {three:.3} with three slides"
+        "right: {before:.3} before, {replaced:.3} replaced, {refreshed:.3} refreshed, {half:.3} half of them, \
+         {three:.3} with three slides"
     );
     assert!(replaced < before - 0.3, "the finger is not another one");
     // three standard errors of the mean below what 50 worlds came to

@@ -15,7 +15,8 @@ use std::process::{Command, Output, Stdio};
 
 /// Where the simulated recordings are, and the options of the command that makes them.
 const RECORDINGS: &str = "host-tools/recordings/simulated";
-const SIMULATE: &str = "--trials 3 --seed 1 --textures \"Computer paper,Coarse suede,Burlap,Denim twill,Corduroy,Terry cloth\"";
+const SIMULATE: &str = "--trials 3 --seed 1 --textures \"Computer paper,Coarse suede,Burlap,Denim \
+ twill,Corduroy,Terry cloth\"";
 const MAX_RECORDINGS: usize = 2_000_000;
 
 fn root() -> &'static Path {

@@ -1,8 +1,8 @@
 //! Tactus in a browser: a simulated probe, [`Session`], and one at a line, [`Remote`], as WebAssembly, asked in JSON.
 //!
-//! Five functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is needed: the page
-//! writes a request where [`request`] says, calls [`ask`] or [`remote`], and reads the reply where [`reply`] says. The module imports
-//! nothing.
+//! Five functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is
+//! needed: the page writes a request where [`request`] says, calls [`ask`] or [`remote`], and reads the reply where
+//! [`reply`] says. The module imports nothing.
 
 use std::cell::RefCell;
 

@@ -33,7 +33,8 @@ macro_rules! exceptions {
 }
 
 exceptions! {
-    TactusError: PyException, "Whatever goes wrong in this package: the sentence of the command line, which says what to do.";
+    TactusError: PyException, "Whatever goes wrong in this package: the sentence of the command line, which says what \
+     to do.";
     RecordingError: TactusError, "Recordings cannot be read or written.";
     SlideError: TactusError, "A slide has no features: it is too short, silent, or not whole.";
     TableError: TactusError, "A table cannot be learned, read, explored or written.";

@@ -24,13 +24,14 @@ type Core = explorer::Explorer<'static, MAX_TEXTURES>;
 
 /// An exploration of one unknown texture with a table, as the probe makes it.
 ///
-/// among: names of the textures that it may be; all, unless given. method: how to decide and to choose; the best for the table,
-/// unless given. threshold: a texture more probable than this is the answer. max_slides: after so many the most probable one is.
-/// open: whether the answer may be that it is none of them. false_alarm: share of known textures that may be taken for new ones;
-/// the table's own, unless given. measures: what the rig measures of "traction", "roughness" and "fineness"; all, unless given.
-/// seed: for methods that choose at random.
+/// among: names of the textures that it may be; all, unless given. method: how to decide and to choose; the best for
+/// the table, unless given. threshold: a texture more probable than this is the answer. max_slides: after so many the
+/// most probable one is. open: whether the answer may be that it is none of them. false_alarm: share of known textures
+/// that may be taken for new ones; the table's own, unless given. measures: what the rig measures of "traction",
+/// "roughness" and "fineness"; all, unless given. seed: for methods that choose at random.
 ///
-/// Raises TableError where the table cannot be explored so, KeyError for a name that it does not have, ValueError for an argument.
+/// Raises TableError where the table cannot be explored so, KeyError for a name that it does not have, ValueError for
+/// an argument.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Explorer {
     inner: Mutex<Inner>,
@@ -116,8 +117,8 @@ impl Explorer {
         seed: u32,
     ) -> PyResult<Self> {
         let bytes = Arc::clone(&table.bytes);
-        // SAFETY: these bytes neither move nor change nor end before `bytes` does, which lives beside what borrows them and is
-        // dropped after it; nothing that borrows them for longer leaves this module.
+        // SAFETY: these bytes neither move nor change nor end before `bytes` does, which lives beside what borrows them
+        // and is dropped after it; nothing that borrows them for longer leaves this module.
         let lasting: &'static [u8] = unsafe { &*Arc::as_ptr(&bytes) };
         let read = Read::read(lasting).map_err(|why| why.raise())?;
         let best = Method::of(explorer::Method::of(read.contents()));
@@ -155,9 +156,9 @@ impl Explorer {
         inner.chosen = None;
     }
 
-    /// Chooses the movement that should tell the remaining candidates apart, by the method: a dict with force_n, speed_mm_s,
-    /// property (the one looked at; None for all), uncertainty (expected after it, 0 to 1, eq. 11) and benefit (eq. 12), which
-    /// are None where the method does not look ahead.
+    /// Chooses the movement that should tell the remaining candidates apart, by the method: a dict with force_n,
+    /// speed_mm_s, property (the one looked at; None for all), uncertainty (expected after it, 0 to 1, eq. 11) and
+    /// benefit (eq. 12), which are None where the method does not look ahead.
     fn next_movement<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let mut inner = self.inner();
         let expected = inner.core.expected_outcomes();
@@ -178,7 +179,8 @@ impl Explorer {
     /// Takes in what a slide measured. property: which one is looked at, for methods that look at one; that of the last
     /// `next_movement`, unless given.
     ///
-    /// Raises ValueError where the table does not have the slide's movement, TableError where the slide lacks what is compared.
+    /// Raises ValueError where the table does not have the slide's movement, TableError where the slide lacks what is
+    /// compared.
     #[pyo3(signature = (slide, property=None))]
     fn update(&self, slide: &Features, property: Option<&str>) -> PyResult<()> {
         let mut inner = self.inner();
@@ -222,8 +224,9 @@ impl Explorer {
         self.inner().core.slides()
     }
 
-    /// The answer as soon as there is one, else None: a dict with told ("sure", "changed", "new" or "undecided"), texture (the most
-    /// probable one), probability, log_odds (that it is none of those known; None where that cannot be told) and slides.
+    /// The answer as soon as there is one, else None: a dict with told ("sure", "changed", "new" or "undecided"),
+    /// texture (the most probable one), probability, log_odds (that it is none of those known; None where that cannot
+    /// be told) and slides.
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let inner = self.inner();
         let verdict = inner.core.verdict();
@@ -237,15 +240,16 @@ impl Explorer {
         object(py, &inner.answer(inner.core.best()))
     }
 
-    /// With one candidate: whether the slides are of it. A dict with score (ln of how much likelier they are of another texture), limit
-    /// (above it they are) and answer ("Same", "Different" or "Unsure"). None before the first slide, and with a table without limits.
+    /// With one candidate: whether the slides are of it. A dict with score (ln of how much likelier they are of another
+    /// texture), limit (above it they are) and answer ("Same", "Different" or "Unsure"). None before the first slide,
+    /// and with a table without limits.
     fn verification<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let now = self.inner().core.verification();
         now.map(|now| object(py, &now)).transpose()
     }
 
-    /// With one candidate: the share of other textures that would pass as well as these slides, 0 to 1 (what `tactus verify` calls
-    /// false_accept); None where no other texture of the table has slides of their movements.
+    /// With one candidate: the share of other textures that would pass as well as these slides, 0 to 1 (what
+    /// `tactus verify` calls false_accept); None where no other texture of the table has slides of their movements.
     fn false_accept(&self) -> Option<f64> {
         let inner = self.inner();
         let reference = inner.core.best().texture;

@@ -144,9 +144,9 @@ fn samples<'a>(name: &str, array: &'a PyReadonlyArray1<'_, i16>) -> PyResult<&'a
 /// The `Features` of a slide of which the samples are here.
 ///
 /// pac: int16 of shape (samples,), P_AC at 2200 Hz in counts about the still baseline, from the start of the record.
-/// window_s: start and end of the part at constant speed, s. force_n, speed_mm_s: the movement.
-/// still: P_AC of the finger at rest (int16, 2200 Hz), or background: its power after the band-pass, counts^2. One is needed.
-/// shear_mn: tangential force, int16, mN, at shear_rate_hz. pdc: P_DC, int16, counts, at pdc_rate_hz. Both from the same start.
+/// window_s: start and end of the part at constant speed, s. force_n, speed_mm_s: the movement. still: P_AC of the
+/// finger at rest (int16, 2200 Hz), or background: its power after the band-pass, counts^2. One is needed. shear_mn:
+/// tangential force, int16, mN, at shear_rate_hz. pdc: P_DC, int16, counts, at pdc_rate_hz. Both from the same start.
 ///
 /// Raises SlideError where there are no features in it, ValueError where an array is not contiguous.
 #[pyfunction]

@@ -1,5 +1,6 @@
-//! The Python package `tactus`: recordings, features, tables, explorations, simulated and real probes, all by the code that runs on
-//! the chip and in the command `tactus`. What each name means, with shapes and units, stands in `tactus/__init__.pyi`.
+//! The Python package `tactus`: recordings, features, tables, explorations, simulated and real probes, all by the code
+//! that runs on the chip and in the command `tactus`. What each name means, with shapes and units, stands in
+//! `tactus/__init__.pyi`.
 
 mod arguments;
 mod error;

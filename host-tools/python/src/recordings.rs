@@ -127,16 +127,19 @@ impl Recordings {
         movements.map(|m| (m.force_n(), m.speed_mm_s())).collect()
     }
 
-    /// The finger, and the day of its calibration as 20261121 (0: not known). Raises RecordingError where there are two fingers.
+    /// The finger, and the day of its calibration as 20261121 (0: not known). Raises RecordingError where there are two
+    /// fingers.
     #[getter]
     fn finger(&self) -> PyResult<(String, u32)> {
         let (finger, calibrated) = self.set.finger().map_err(|why| why.raise())?;
         Ok((finger.to_string(), calibrated))
     }
 
-    /// Reads the slides of a texture (its name or its number) with their samples, in the order of time: a list of `Slide`.
+    /// Reads the slides of a texture (its name or its number) with their samples, in the order of time: a list of
+    /// `Slide`.
     ///
-    /// Raises KeyError where there is no such texture, RecordingError where a file cannot be read or is not what the manifest says.
+    /// Raises KeyError where there is no such texture, RecordingError where a file cannot be read or is not what the
+    /// manifest says.
     fn slides(&self, py: Python<'_>, texture: Wanted) -> PyResult<Vec<Slide>> {
         let index = self.find(&texture)?;
         let slides = work(py, |_| self.set.load_texture(index))?;
@@ -157,9 +160,10 @@ impl Recordings {
 
     /// The features of all slides, as columns of a dict, a row for each slide: what `tactus features` prints.
     ///
-    /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it cannot be measured), roughness_ln,
-    /// fineness_unfiltered_ln (float32), roughness_is_bound (bool), each of shape (slides,); ln_psd_bands of shape (slides, 8) and
-    /// ln_fused_bands of shape (slides, 12), float32. See `Features` for units. Slides are read and measured once, on all cores.
+    /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it cannot be measured),
+    /// roughness_ln, fineness_unfiltered_ln (float32), roughness_is_bound (bool), each of shape (slides,); ln_psd_bands
+    /// of shape (slides, 8) and ln_fused_bands of shape (slides, 12), float32. See `Features` for units. Slides are
+    /// read and measured once, on all cores.
     ///
     /// Raises RecordingError where a file cannot be read, or a slide has no features; KeyboardInterrupt after Ctrl-C.
     fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

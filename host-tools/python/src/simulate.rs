@@ -16,8 +16,8 @@ use crate::work::work;
 
 /// A simulated rig with a texture under its finger.
 ///
-/// texture: its name in Table 1 or its number. seed: the world; others have other textures of the same names. trial: where the
-/// sample lies, and what its noise is like. finger: "biotac", "analog" or "mems".
+/// texture: its name in Table 1 or its number. seed: the world; others have other textures of the same names. trial:
+/// where the sample lies, and what its noise is like. finger: "biotac", "analog" or "mems".
 ///
 /// Raises KeyError for a texture that Table 1 does not have, SimulationError where the rig does not start.
 #[pyclass(frozen, module = "tactus")]
@@ -122,10 +122,11 @@ impl SimulatedRig {
 /// Records slides on the simulated rig: a dict from the name of each texture to its list of `Slide`, the samples that
 /// `tactus simulate` writes.
 ///
-/// textures: names in Table 1 or numbers; all 117, unless given. trials: of each texture at each of the study's three movements.
-/// seed: the world. finger: "biotac", "analog" or "mems".
+/// textures: names in Table 1 or numbers; all 117, unless given. trials: of each texture at each of the study's three
+/// movements. seed: the world. finger: "biotac", "analog" or "mems".
 ///
-/// Raises KeyError for a texture that Table 1 does not have, SimulationError for a fault of the rig, KeyboardInterrupt after Ctrl-C.
+/// Raises KeyError for a texture that Table 1 does not have, SimulationError for a fault of the rig, KeyboardInterrupt
+/// after Ctrl-C.
 #[pyfunction]
 #[pyo3(signature = (textures=None, *, trials=5, seed=1, finger="biotac"))]
 fn simulate<'py>(

@@ -23,7 +23,8 @@ use crate::recordings::Recordings;
 use crate::values::object;
 use crate::work::work;
 
-/// A texture table: what is known of every texture at every movement. `len()` counts its textures, `bytes()` is its file.
+/// A texture table: what is known of every texture at every movement. `len()` counts its textures, `bytes()` is its
+/// file.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Table {
     pub(crate) bytes: Arc<[u8]>,
@@ -55,8 +56,8 @@ fn expected(drift: (f32, f32), false_alarm: Option<f32>) -> PyResult<Expected> {
 impl Table {
     /// Learns a table from the first slides of every texture and movement, as `tactus learn` does, byte for byte.
     ///
-    /// train_slides: so many of each, or as many as there are, two at least. method: what the table is for.
-    /// features: of a fused table, "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
+    /// train_slides: so many of each, or as many as there are, two at least. method: what the table is for. features:
+    /// of a fused table, "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
     /// drift: standard deviations of band powers (ln) and of traction (share) that it expects from session to session.
     /// false_alarm: share of known textures that may be taken for new ones, 0.0005 to 0.2.
     ///
@@ -82,8 +83,8 @@ impl Table {
         Self::of(work(py, learn)?)
     }
 
-    /// Learns a table from features of one's own: a dict from the name of each texture to its list of `Features`. Each texture needs
-    /// two slides at least of every movement that occurs. Arguments and errors as of `learn`.
+    /// Learns a table from features of one's own: a dict from the name of each texture to its list of `Features`. Each
+    /// texture needs two slides at least of every movement that occurs. Arguments and errors as of `learn`.
     #[staticmethod]
     #[pyo3(signature = (slides, *, method="fused", features=None, drift=(0.1, 0.04), false_alarm=None))]
     fn learn_slides(
@@ -168,7 +169,8 @@ impl Table {
         Ok(movements.map(|m| (m.force_n(), m.speed_mm_s())).collect())
     }
 
-    /// The best method for what the table holds: "fused" or "student-all", which shares its tables with "paper" and "student".
+    /// The best method for what the table holds: "fused" or "student-all", which shares its tables with "paper" and
+    /// "student".
     #[getter]
     fn method(&self) -> PyResult<String> {
         let best = explorer::Method::of(self.read()?.contents());

@@ -18,8 +18,8 @@ const STACK: usize = 16 << 20;
 /// Why a worker ended early.
 struct Cancelled;
 
-/// Does work on a thread of its own; the work calls what it gets between its pieces, and does not come back from that after
-/// Ctrl-C. Other threads of Python go on meanwhile.
+/// Does work on a thread of its own; the work calls what it gets between its pieces, and does not come back from that
+/// after Ctrl-C. Other threads of Python go on meanwhile.
 ///
 /// # Errors
 /// The work's, or that of a signal's handler: `KeyboardInterrupt`.

@@ -13,8 +13,8 @@
 //! 0: the manifest holds out "repetition 2", which is its `rep` 1.
 //!
 //! An independent program (numpy, 8000 runs) comes to the protocol's figures: 58 % right by the paper's way (protocol:
-//! 56), 96 by Student-t (96), 100 in 2.8 slides by three properties fused (99.9 in 2.7), 100 by eight bands fused (100).
-//! The paper's figure is brittle, for its standard deviations come from two slides.
+//! 56), 96 by Student-t (96), 100 in 2.8 slides by three properties fused (99.9 in 2.7), 100 by eight bands fused
+//! (100). The paper's figure is brittle, for its standard deviations come from two slides.
 //!
 //! # What is measured
 //!

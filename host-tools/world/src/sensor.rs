@@ -158,7 +158,8 @@ impl SensorPeer {
         self.ended_ns = now_ns;
     }
 
-    /// One period of chip select as a whole, for tests, from `now_ns` on: sends `mosi`, and fills `miso` with the answer.
+    /// One period of chip select as a whole, for tests, from `now_ns` on: sends `mosi`, and fills `miso` with the
+    /// answer.
     #[cfg(test)]
     pub(super) fn transfer(
         &mut self,

@@ -93,8 +93,8 @@ pub(crate) fn build() -> Command {
     build
 }
 
-/// A cargo command on the emulator alone. rigless declares Rust 1.98, and cranelift below it 1.96: they build with 1.95,
-/// which the README names, and these tests are run with that.
+/// A cargo command on the emulator alone. rigless declares Rust 1.98, and cranelift below it 1.96: they build with
+/// 1.95, which the README names, and these tests are run with that.
 pub(crate) fn emulator(command: &str) -> Command {
     let mut cargo = cargo();
     cargo.args([command, "--package", "tactus-emulator"]);

@@ -199,7 +199,8 @@ fn stack_text(stack: &Value, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
         }
     }
     line(format_args!(
-        "{:>7}  in use at most, as it came\n{:>7}  all of them upon one another, with their exception frames: the bound\n\
+        "{:>7}  in use at most, as it came\n{:>7}  all of them upon one another, with their exception frames: the \
+         bound\n\
          TIM2 and SPI1 run the sensor's slots, UART5 the servo: the table in firmware/src/rig.rs",
         number(stack, "used"),
         number(stack, "bound")

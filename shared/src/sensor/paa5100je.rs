@@ -120,7 +120,8 @@ pub enum MotionFault {
     #[error("the motion sensor's bus failed")]
     Bus,
     #[error(
-        "no PAA5100JE answers: it says 0x{:02x} and 0x{:02x}; check power, cable, chip select and SPI mode 3", .0[0], .0[1]
+        "no PAA5100JE answers: it says 0x{:02x} and 0x{:02x}; check power, cable, chip select and SPI mode \
+         3", .0[0], .0[1]
     )]
     Identity([u8; 2]),
     #[error("the motion sensor has forgotten its settings: check its power")]

@@ -160,7 +160,8 @@ impl Calibration {
 #[allow(missing_docs)] // their texts say it
 pub enum CalibrationError {
     #[error(
-        "a scale of the calibration is absurd (a count of P_DC is 5.75 to 23 mN; below 0, a load cell's signal wires are swapped): \
+        "a scale of the calibration is absurd (a count of P_DC is 5.75 to 23 mN; below 0, a load cell's signal wires \
+         are swapped): \
          calibrate again"
     )]
     Scale,

@@ -117,7 +117,8 @@ impl StartStep {
 /// A part of a finger gives a wrong answer during start-up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error(
-    "the {part} answers {got:02X} to {sent:02X} and not {want:02X}: check its power, its wires, its chip select and the SPI \
+    "the {part} answers {got:02X} to {sent:02X} and not {want:02X}: check its power, its wires, its chip select and \
+     the SPI \
      mode"
 )]
 pub struct Unexpected {

@@ -55,7 +55,8 @@ fn mistakes() -> String {
 
 fn faults() -> String {
     let mut text = String::from(
-        "| fault | how it is detected | deadline | what stops | what is refused | what to do |\n|---|---|---|---|---|---|\n",
+        "| fault | how it is detected | deadline | what stops | what is refused | what to do \
+         |\n|---|---|---|---|---|---|\n",
     );
     for row in FAULTS {
         text += &format!(
@@ -181,7 +182,8 @@ fn wire() -> String {
         enums.next().unwrap_or_else(|| panic!("no enum {name}"))
     };
     let mut text = section("shared/src", "A frame is a message");
-    text += "\nA message is in [postcard](https://postcard.jamesmunns.com)'s format, in which a variant is its number.\n";
+    text += "\nA message is in [postcard](https://postcard.jamesmunns.com)'s format, in which a variant is its \
+     number.\n";
     let mut told = Vec::new();
     for (heading, name) in [
         ("Commands of the host", "Command"),

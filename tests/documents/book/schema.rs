@@ -29,7 +29,8 @@ pub(super) fn schema() -> String {
         made.add(found)
     });
     let mut text = format!(
-        "{{\n\"protocol\": {PROTOCOL},\n\"bringup\": {BRINGUP},\n\"max_message\": {MAX_MESSAGE},\n\"roots\": {},\n\"types\": {{\n",
+        "{{\n\"protocol\": {PROTOCOL},\n\"bringup\": {BRINGUP},\n\"max_message\": {MAX_MESSAGE},\n\"roots\": \
+         {},\n\"types\": {{\n",
         json!(roots)
     );
     // a line for each type: a change of one is a change of a line

@@ -17,8 +17,8 @@ const RULE: &[u8] = b"\n---\n";
 
 /// A folder of recordings in one of the formats, or a table of properties: the first byte says which.
 ///
-/// The rest is the manifest; what follows a line `---` in it is the content of the file `a`, which is there as `a.npy`, and
-/// compressed as `a.gz`. `HASH`, `PACKED_HASH`, `SIZE` and `PACKED_SIZE` in the manifest become theirs.
+/// The rest is the manifest; what follows a line `---` in it is the content of the file `a`, which is there as `a.npy`,
+/// and compressed as `a.gz`. `HASH`, `PACKED_HASH`, `SIZE` and `PACKED_SIZE` in the manifest become theirs.
 pub fn recordings(data: &[u8]) {
     drop(read(data));
 }

@@ -1,8 +1,8 @@
-//! What the fuzz targets do with their bytes. A target fails by a panic, an overflow, unbounded memory, or an assertion that
-//! what was accepted makes sense.
+//! What the fuzz targets do with their bytes. A target fails by a panic, an overflow, unbounded memory, or an assertion
+//! that what was accepted makes sense.
 //!
-//! Checksums would keep all mutations out: where a format has one, the target puts the right one behind the bytes, unless the
-//! first byte says to leave them as they are.
+//! Checksums would keep all mutations out: where a format has one, the target puts the right one behind the bytes,
+//! unless the first byte says to leave them as they are.
 
 mod flash;
 mod folder;
@@ -195,8 +195,8 @@ fn explore(table: &Table<'_>, method: Method, bytes: &[u8], mode: u8) {
 
 /// The store's flash, as a wild program or a worn cell may leave it: opened, used, and opened again.
 ///
-/// The first byte names one of the [`images`], or blank flash; three bytes each say what is changed in it; the rest is what
-/// is done.
+/// The first byte names one of the [`images`], or blank flash; three bytes each say what is changed in it; the rest is
+/// what is done.
 pub fn store(data: &[u8]) {
     let &[image, changes, ref rest @ ..] = data else {
         return;

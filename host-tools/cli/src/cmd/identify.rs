@@ -337,8 +337,10 @@ struct Demonstration {
 pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(
         out,
-        "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, over a\n\
-         stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then given\n\
+        "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, \
+         over a\n\
+         stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then \
+         given\n\
          one of them without being told which. The firmware's own core measures, decides and controls the rig.\n"
     )?;
     out.flush()?;

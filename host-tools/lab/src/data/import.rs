@@ -89,7 +89,8 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
     let materials = materials(&raw)?;
     if materials.is_empty() {
         let cause = "nothing to import: neither a manifest, nor raw_data/mat1/mat1_1_bio.csv and the like of \
-                     https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, ...";
+                     https://github.com/dexrob/BioTac_slide_20_50; give the folder that holds raw_data or mat1, mat2, \
+                     ...";
         return Err(RecordingError::at(from, cause));
     }
     let mut done = Imported {

@@ -61,7 +61,8 @@ impl RecordingSet {
             let by = String::from_utf8_lossy(&by).into_owned();
             return Err(RecordingError::unfinished(folder, &by));
         } else {
-            let cause = "neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the publisher's CSV \
+            let cause = "neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the \
+             publisher's CSV \
                          files (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first";
             return Err(RecordingError::at(folder, cause));
         };

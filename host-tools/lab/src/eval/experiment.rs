@@ -261,7 +261,8 @@ impl Experiment {
                 return Err(match train_slides {
                     Some(wanted) => ExperimentError::training(texture, movement, there, wanted),
                     None => ExperimentError(format!(
-                        "{texture}, {movement}: {there} training slide; the spread of a texture's slides takes at least \
+                        "{texture}, {movement}: {there} training slide; the spread of a texture's slides takes at \
+                         least \
                          two"
                     )),
                 });

@@ -65,7 +65,8 @@ impl RecordedTexture {
                     played(slide).ok_or_else(|| {
                         let number = slide.number;
                         RecordingError::said(format!(
-                            "slide {number} of {name} has no shear at {SHEAR_HZ} Hz; play recordings with a force sensor of \
+                            "slide {number} of {name} has no shear at {SHEAR_HZ} Hz; play recordings with a force \
+                             sensor of \
                              that rate"
                         ))
                     })

@@ -154,7 +154,8 @@ proptest! {
             // whatever is lost, nobody is pressed harder than was set
             let now = block_on(store.high_force()).unwrap();
             prop_assert_eq!(now, high_force && lost.is_none(), "{:?}, told {:?}", changed, lost);
-            prop_assert!(losses <= usize::from(lost.is_some()), "{} lost, told {:?}: {:?}, {:?}", losses, lost, changed, [&before, &found]);
+            prop_assert!(losses <= usize::from(lost.is_some()), "{} lost, told {:?}: {:?}, \
+             {:?}", losses, lost, changed, [&before, &found]);
         }
         // the next boot finds the same and says the same
         let mut ram = store.close().again();

@@ -100,7 +100,8 @@ impl Manifest {
             let title = json["title"].as_str().unwrap_or_default();
             // the other recordings that this program knows have a manifest of the same name
             if title.starts_with("FabricSlide") {
-                let why = "this is FabricSlide, slides of another finger without P_AC: `tactus evaluate --fabrics DIR` plays it";
+                let why = "this is FabricSlide, slides of another finger without P_AC: `tactus evaluate --fabrics \
+                 DIR` plays it";
                 return fault("title", why.to_owned());
             }
             fault(&place, format!("{e}; the layout is that of data/biotac"))
@@ -131,7 +132,8 @@ impl Manifest {
             if bytes.is_none_or(|n| n as u64 != entry.bytes_raw) {
                 let (slides, values) = (entry.n_slides, record.values);
                 let cause = format!(
-                    "bytes_raw is {}, but slides ({slides}) of {values} 16-bit values are not that many bytes; they must \
+                    "bytes_raw is {}, but slides ({slides}) of {values} 16-bit values are not that many bytes; they \
+                     must \
                      agree",
                     entry.bytes_raw
                 );

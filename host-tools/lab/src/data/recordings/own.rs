@@ -171,7 +171,8 @@ impl Entry {
             let version: u32 = row.parse("version", "the number of a version")?;
             if version != VERSION {
                 let cause = format!(
-                    "version {version}, and this program reads version {VERSION}: write the recordings anew, or use the \
+                    "version {version}, and this program reads version {VERSION}: write the recordings anew, or use \
+                     the \
                      program that wrote them"
                 );
                 return Err(row.error(Some("version"), cause));

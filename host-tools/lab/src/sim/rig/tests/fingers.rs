@@ -101,9 +101,9 @@ fn explore_on_the_rig(finger: FingerName, world: &Collection) -> usize {
     explored.iter().filter(|e| e.0).count()
 }
 
-/// From five slides of each of twelve textures. Vibrations of the handle reach the transducers of the fingers of parts, and no
-/// fluid's resonance shapes their signal: textures are less far apart. From fifteen slides of each 60, 60 and 56 of 60
-/// are right. The book says so.
+/// From five slides of each of twelve textures. Vibrations of the handle reach the transducers of the fingers of parts,
+/// and no fluid's resonance shapes their signal: textures are less far apart. From fifteen slides of each 60, 60 and 56
+/// of 60 are right. The book says so.
 #[test]
 fn an_exploration_of_each_texture_by_hand() {
     for (finger, least) in FingerName::ALL.into_iter().zip([11, 9, 9]) {
