@@ -157,6 +157,24 @@ fn a_standing_stage_is_blocked_or_its_encoder_silent() {
     assert_eq!(goes, None);
 }
 
+/// The mean of the last 10 ms is behind a force that rises.
+#[test]
+fn a_rising_force_is_judged_as_it_is_now() {
+    let (words, inputs) = at_rest(0);
+    let inputs = GuardInputs {
+        words: &words,
+        ..inputs
+    };
+    let judged = |counts: fn(u16) -> u16| {
+        let mut meter = ForceMeter::new(2000.0);
+        (0..44).for_each(|n| meter.push(Counts::new(2000 + counts(n)).unwrap()));
+        assert!(meter.counts() * 11.5 < 1900.0);
+        Guard::default().tick(&inputs, &meter, &biotac::PARTS.model, 11.5, 2050.0)
+    };
+    assert_eq!(judged(|_| 162), None);
+    assert_eq!(judged(|n| 5 * n), Some(Fault::ForceHigh));
+}
+
 #[test]
 fn no_calibration_allows_more_than_the_papers() {
     let mut meter = ForceMeter::new(2000.0);
