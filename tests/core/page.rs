@@ -19,7 +19,8 @@ fn world(textures: u8, paper: bool, drift: f64) -> Value {
 }
 
 fn identify(texture: u8, seed: u32) -> Value {
-    json!({"do": "identify", "texture": texture, "seed": seed, "threshold": 0.99, "false_alarm": 0.02, "max_slides": 10})
+    json!({"do": "identify", "texture": texture, "seed": seed, "threshold": 0.99, "false_alarm": 0.02,
+        "max_slides": 10})
 }
 
 /// A probe, and what it knows.

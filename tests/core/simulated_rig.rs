@@ -340,12 +340,14 @@ fn command() -> impl Strategy<Value = Command> {
     };
     prop_oneof![
         2 => Just(Command::Home),
-        6 => (100u16..=2000, 5_000u32..=150_000, any_float()).prop_map(|(force_mn, speed_um_s, start)| Command::Start { force_mn, speed_um_s, start }),
+        6 => (100u16..=2000, 5_000u32..=150_000, any_float())
+            .prop_map(|(force_mn, speed_um_s, start)| Command::Start { force_mn, speed_um_s, start }),
         1 => prop_oneof![5_000u32..150_000, any::<u32>()].prop_map(Command::Unloaded),
         1 => Just(Command::Stop),
         1 => Just(Command::Reset),
         1 => any::<bool>().prop_map(Command::AllowHighForce),
-        1 => (any_float(), any_float(), any_float()).prop_map(|(mn_per_count, no_contact, newton_per_ampere)| Command::Calibrate { mn_per_count, no_contact, newton_per_ampere }),
+        1 => (any_float(), any_float(), any_float()).prop_map(
+            |(mn_per_count, no_contact, newton_per_ampere)| Command::Calibrate { mn_per_count, no_contact, newton_per_ampere }),
         1 => (1u8..=117).prop_map(Command::Place),
         1 => Just(Command::SampleChanged),
         1 => (0u16..=2000).prop_map(Command::Weigh),

@@ -100,7 +100,8 @@ fn property(name: &str) -> PyResult<Property> {
 #[pymethods]
 impl Explorer {
     #[new]
-    #[pyo3(signature = (table, *, among=None, method=None, threshold=0.99, max_slides=10, open=true, false_alarm=None, measures=None, seed=1))]
+    #[pyo3(signature = (table, *, among=None, method=None, threshold=0.99, max_slides=10, open=true, false_alarm=None,
+        measures=None, seed=1))]
     #[expect(
         clippy::too_many_arguments,
         reason = "all but the first have names where it is called"

@@ -150,7 +150,8 @@ fn samples<'a>(name: &str, array: &'a PyReadonlyArray1<'_, i16>) -> PyResult<&'a
 ///
 /// Raises SlideError where there are no features in it, ValueError where an array is not contiguous.
 #[pyfunction]
-#[pyo3(signature = (pac, *, window_s, force_n, speed_mm_s, still=None, background=None, shear_mn=None, shear_rate_hz=100, pdc=None, pdc_rate_hz=100))]
+#[pyo3(signature = (pac, *, window_s, force_n, speed_mm_s, still=None, background=None, shear_mn=None,
+    shear_rate_hz=100, pdc=None, pdc_rate_hz=100))]
 #[expect(
     clippy::too_many_arguments,
     reason = "all but the first have names where it is called"

@@ -332,7 +332,8 @@ impl Probe {
     /// log go the table first and raw samples, too: with them `tactus device log replay` computes every decision again.
     ///
     /// Raises ProbeError where the probe refuses or is gone, KeyError for a texture that it does not know.
-    #[pyo3(signature = (*, among=None, method=None, threshold=0.99, max_slides=10, open=true, learn=false, false_alarm=None, seed=None))]
+    #[pyo3(signature = (*, among=None, method=None, threshold=0.99, max_slides=10, open=true, learn=false,
+        false_alarm=None, seed=None))]
     #[expect(
         clippy::too_many_arguments,
         reason = "all have names where it is called"

@@ -63,7 +63,8 @@ impl Table {
     ///
     /// Raises TableError where the slides make no table, RecordingError where they cannot be read.
     #[staticmethod]
-    #[pyo3(signature = (recordings, *, train_slides=5, method="fused", features=None, drift=(0.1, 0.04), false_alarm=None))]
+    #[pyo3(signature = (recordings, *, train_slides=5, method="fused", features=None, drift=(0.1, 0.04),
+        false_alarm=None))]
     fn learn(
         py: Python<'_>,
         recordings: &Recordings,

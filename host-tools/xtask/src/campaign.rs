@@ -223,8 +223,7 @@ fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<
     result(&mut cases)
 }
 
-/// Runs the tests that are marked `#[ignore]`, but for those that are a part of their own, and all others with all of
-/// their seeds.
+/// Runs every test with every seed, the ignored ones too, but for those that are a part of their own.
 fn left_out() -> Result<String> {
     let mut passed = 0;
     let mut board = emulate::emulator("test");

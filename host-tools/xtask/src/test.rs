@@ -56,8 +56,11 @@ fn lints() -> Result<()> {
 }
 
 fn documentation() -> Result<()> {
-    let mut doc = workspace("doc");
-    doc.arg("--no-deps");
+    let mut doc = cargo();
+    doc.args(["doc", "--no-deps", "--locked"]);
+    for library in ["core", "link", "world", "lab", "study"] {
+        doc.args(["--package", &format!("tactus-{library}")]);
+    }
     announce(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
 }
 

@@ -142,12 +142,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn power_does_not_depend_on_the_blocks(samples in proptest::collection::vec(-3000i16..3000, 1..700), cuts in proptest::collection::vec(1usize..200, 1..20)) {
+        fn power_does_not_depend_on_the_blocks(samples in proptest::collection::vec(-3000i16..3000, 1..700),
+            cuts in proptest::collection::vec(1usize..200, 1..20)) {
             let plan = Plan::new();
             // straight from the definition, in f64
             let at = |n: isize| usize::try_from(n).ok().and_then(|n| samples.get(n)).map_or(0.0, |&x| f64::from(x));
             let oracle = (0..samples.len() as isize).map(|n| {
-                let y: f64 = BAND_PASS.iter().enumerate().map(|(k, &h)| f64::from(h) / 32768.0 * at(n - k as isize)).sum();
+                let taps = BAND_PASS.iter().enumerate();
+                let y: f64 = taps.map(|(k, &h)| f64::from(h) / 32768.0 * at(n - k as isize)).sum();
                 y * y
             }).sum::<f64>() / samples.len() as f64;
 

@@ -361,7 +361,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn spectrum_does_not_depend_on_the_blocks(samples in proptest::collection::vec(-2048i16..2048, 512..2500), cuts in proptest::collection::vec(1usize..600, 1..20)) {
+        fn spectrum_does_not_depend_on_the_blocks(samples in proptest::collection::vec(-2048i16..2048, 512..2500),
+            cuts in proptest::collection::vec(1usize..600, 1..20)) {
             let mut cut = SpectrumSum::default();
             let mut rest = &samples[..];
             for n in cuts.iter().cycle() {

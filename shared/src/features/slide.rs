@@ -543,7 +543,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn properties_do_not_depend_on_the_blocks(cuts in proptest::collection::vec(1usize..700, 1..12), start in 0u32..600, length in 512u32..1400) {
+        fn properties_do_not_depend_on_the_blocks(cuts in proptest::collection::vec(1usize..700, 1..12),
+            start in 0u32..600, length in 512u32..1400) {
             let samples = texture(2000);
             let whole = measure(&samples, start..start + length, &[2000]);
             prop_assert!(whole.is_ok());

@@ -91,7 +91,7 @@ pub struct Training {
 impl Training {
     /// Begins a training, or begins it again; `table` is the one in use, `buffer` the bytes that a table may have.
     ///
-    /// Without a table its movements are [`FIRST_MOVEMENTS`], or the pilot's.
+    /// Without a table its movements are the first ones, or the pilot's.
     /// Errors: everything that would keep the texture out of the table in the end: see [`TrainingError`].
     #[inline]
     pub fn new(

@@ -2,7 +2,7 @@
 
 use crate::features::Movement;
 
-/// Wear after which the skin should be looked at, J of sliding weighted by [`wearing`].
+/// Wear after which the skin should be looked at, J of sliding weighted by the wear that a power makes.
 ///
 /// The paper changed the skin twice during 117 textures x 3 movements x 5 trials, every time there were visible signs
 /// of wear: about 585 slides a skin, of about 30 mm at 0.6 N of shear, 18 mJ each at 8 mW. Half of that, so that the

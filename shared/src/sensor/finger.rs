@@ -186,7 +186,7 @@ pub enum BadWord {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[allow(missing_docs)] // their texts say it
 pub enum FingerError {
-    /// A BioTac's word is none.
+    /// A BioTac's word is invalid.
     #[error(transparent)]
     BioTac(#[from] WordError),
     #[error("no converter answers (null bit is 1): check power, cable, chip select and SPI mode 0")]

@@ -161,8 +161,7 @@ impl Calibration {
 pub enum CalibrationError {
     #[error(
         "a scale of the calibration is absurd (a count of P_DC is 5.75 to 23 mN; below 0, a load cell's signal wires \
-         are swapped): \
-         calibrate again"
+         are swapped): calibrate again"
     )]
     Scale,
     #[error("P_AC at rest is outside 0..4095 counts: measure it again without contact")]

@@ -118,8 +118,7 @@ impl StartStep {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error(
     "the {part} answers {got:02X} to {sent:02X} and not {want:02X}: check its power, its wires, its chip select and \
-     the SPI \
-     mode"
+     the SPI mode"
 )]
 pub struct Unexpected {
     /// The part.

@@ -380,7 +380,8 @@ proptest! {
 
     #[test]
     fn what_is_written_reads_back((names, movements, trials) in any_table()) {
-        let experience: Vec<Vec<Experience>> = trials.iter().map(|row| row.iter().map(|t| learned(t)).collect()).collect();
+        let experience: Vec<Vec<Experience>> = trials.iter()
+            .map(|row| row.iter().map(|t| learned(t)).collect()).collect();
         let textures = names.iter().zip(&experience).map(|(name, known)| (name.as_str(), &known[..]));
         let mut out = vec![0xff; 40_000];
         let table = encode(&mut out, PropertySet::ALL, &movements, textures).unwrap();
@@ -414,7 +415,8 @@ proptest! {
             }
         }
         // and written again it is the same to the bit
-        let again: Vec<Vec<Experience>> = (0..table.textures()).map(|t| (0..movements.len() as u8).map(|m| table.experience(t, m)).collect()).collect();
+        let again: Vec<Vec<Experience>> = (0..table.textures())
+            .map(|t| (0..movements.len() as u8).map(|m| table.experience(t, m)).collect()).collect();
         let textures = names.iter().zip(&again).map(|(name, known)| (name.as_str(), &known[..]));
         let mut copy = vec![0; 40_000];
         let copy = encode(&mut copy, PropertySet::ALL, &movements, textures).unwrap();

@@ -1,15 +1,17 @@
 //! At a pseudo terminal: cables that are pulled, keys, the monitor.
 
-use std::io::Write as _;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{Shutdown, TcpStream};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use serialport::{SerialPort as _, TTYPort};
 use tactus_core::wire;
 
-use super::software::{Bench, known, once, serve};
+use super::software::{Bench, known, line, once, serve};
 use crate::{Scratch, assert_says};
 
 /// Starts a command, and presses Ctrl-C so long after a request.
@@ -22,10 +24,14 @@ fn interrupted(bench: &Bench, line: &str, asks: fn(&wire::Command) -> bool, ms: 
     interrupt(child)
 }
 
-fn interrupt(child: Child) -> String {
+fn press_ctrl_c(child: &Child) {
     let id = child.id().to_string();
     let killed = Command::new("kill").args(["-INT", &id]).status().unwrap();
     assert!(killed.success());
+}
+
+fn interrupt(child: Child) -> String {
+    press_ctrl_c(&child);
     let Output { status, stderr, .. } = child.wait_with_output().unwrap();
     let said = String::from_utf8(stderr).unwrap();
     assert_eq!(status.code(), Some(130), "{said}");
@@ -99,25 +105,45 @@ fn a_recording_that_is_killed_goes_on_with_the_texture_it_was_at() {
     assert_eq!(bench.at.printed(features).lines().count(), 5);
 }
 
-/// A finger that slides, and a probe that goes on answering nothing.
+/// A finger that slides, and a line that then carries nothing any more.
 #[test]
 fn a_second_ctrl_c_says_that_the_finger_may_be_down() {
     let bench = Bench::new(5);
-    let mut command = bench.command("identify");
+    let (cut, probe) = (Arc::new(AtomicBool::new(false)), bench.port.clone());
+    let is_cut = Arc::clone(&cut);
+    let between = line(move |host| {
+        let probe = TcpStream::connect(probe.trim_start_matches("tcp:")).unwrap();
+        let ends = [(&host, &probe), (&probe, &host)];
+        thread::scope(|scope| {
+            for (mut from, mut to) in ends {
+                let is_cut = Arc::clone(&is_cut);
+                scope.spawn(move || {
+                    let mut bytes = [0; 1024];
+                    while let Ok(length @ 1..) = from.read(&mut bytes) {
+                        if !is_cut.load(Ordering::Relaxed) {
+                            let _ = to.write_all(&bytes[..length]);
+                        }
+                    }
+                    let _ = to.shutdown(Shutdown::Write);
+                });
+            }
+        });
+    });
+    let at = Scratch::new().with("PORT", &between);
+    let mut command = at.command("device identify --port PORT");
     command.stderr(Stdio::piped()).stdout(Stdio::null());
-    let child = command.spawn().unwrap();
+    let mut child = command.spawn().unwrap();
     bench.wait_for(identifies);
-    thread::sleep(Duration::from_millis(200));
-    let id = child.id().to_string();
-    assert!(
-        Command::new("kill")
-            .args(["-INT", &id])
-            .status()
-            .unwrap()
-            .success()
-    );
-    thread::sleep(Duration::from_millis(30));
-    assert_says(&interrupt(child), &["may still be down", "emergency stop"]);
+    cut.store(true, Ordering::Relaxed);
+    press_ctrl_c(&child);
+    // it has taken the first one before the second comes
+    let mut said = BufReader::new(child.stderr.take().unwrap()).lines();
+    let lifting = said.find(|line| line.as_ref().unwrap().contains("lifting the finger"));
+    assert!(lifting.is_some());
+    press_ctrl_c(&child);
+    let rest: String = said.map(Result::unwrap).collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
+    assert_says(&rest, &["may still be down", "emergency stop"]);
 }
 
 #[test]

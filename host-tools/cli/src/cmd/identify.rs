@@ -73,7 +73,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME", requires = "simulated")]
     texture: Option<String>,
     /// How many textures the simulated probe knows; the unknown one is among them
-    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(2..=117))]
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated",
+        value_parser = clap::value_parser!(u8).range(2..=117))]
     among: u8,
     /// Texture table to use; without it one is learned from slides drawn at random, and the rest are presented
     #[arg(long, value_name = "FILE")]

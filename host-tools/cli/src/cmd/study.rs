@@ -43,7 +43,8 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Virtual explorations of each way of exploring; each of the eight pairs has an eighth of them
-    #[arg(long, value_name = "N", default_value_t = 8000, value_parser = clap::value_parser!(u64).range(16..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 8000,
+        value_parser = clap::value_parser!(u64).range(16..=1_000_000))]
     simulations: u64,
     /// How much one touch of a texture differs from the next, 0 to 3: the world's one free knob
     #[arg(long, value_name = "X", default_value_t = VARIATION, value_parser = variation)]

@@ -64,7 +64,8 @@ pub(crate) struct Args {
     #[arg(long, conflicts_with_all = ["reference", "table", "sample"], requires = "texture")]
     simulated: bool,
     /// How many textures the simulated probe knows
-    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated", value_parser = clap::value_parser!(u8).range(4..=117))]
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated",
+        value_parser = clap::value_parser!(u8).range(4..=117))]
     among: u8,
     /// Another seed is another world, and another trial
     #[arg(long, default_value_t = 1, requires = "simulated")]

@@ -18,6 +18,7 @@ use clap::Args as Arguments;
 use serde_json::Value;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
+use tactus_core::wire::Identify;
 use tactus_lab::eval::learn::{TableError, know_lengths};
 use tactus_lab::sim::collection::Collection;
 
@@ -46,6 +47,17 @@ pub(crate) struct Args {
     /// For people, or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+}
+
+/// An exploration of one slide, the same each time.
+fn one_slide() -> Identify {
+    Identify {
+        threshold: 1.0,
+        max_slides: 1,
+        open: false,
+        seed: 1,
+        ..Identify::default()
+    }
 }
 
 /// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.

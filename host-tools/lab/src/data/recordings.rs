@@ -62,12 +62,9 @@ impl RecordingSet {
             return Err(RecordingError::unfinished(folder, &by));
         } else {
             let cause = "neither manifest.csv nor manifest.json in this folder, so it holds no recordings; the \
-             publisher's CSV \
-                         files (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first";
+                         publisher's CSV files (mat1/mat1_1_bio.csv, ...) must pass through `tactus import` first";
             return Err(RecordingError::at(folder, cause));
         };
-        let rows: usize = slides.iter().map(Vec::len).sum();
-        tracing::info!(folder = %folder.display(), textures = textures.len(), slides = rows, "reads the manifest");
         Ok(Self {
             folder: folder.to_owned(),
             textures,
@@ -134,13 +131,10 @@ impl RecordingSet {
     /// Reads the samples of texture number `index` of [`textures`](Self::textures), slides in the order of time.
     /// Errors: if a file cannot be read, or its hash, size or format is wrong.
     pub fn load_texture(&self, index: usize) -> Result<Vec<Recording>> {
-        let slides = match &self.source {
+        match &self.source {
             Source::Own(manifest) => manifest.load(&self.folder, index),
             Source::Biotac(manifest) => manifest.load(&self.folder, index),
-        }?;
-        let texture = &self.textures[index].name;
-        tracing::info!(texture, slides = slides.len(), "reads samples");
-        Ok(slides)
+        }
     }
 }
 

@@ -262,8 +262,7 @@ impl Experiment {
                     Some(wanted) => ExperimentError::training(texture, movement, there, wanted),
                     None => ExperimentError(format!(
                         "{texture}, {movement}: {there} training slide; the spread of a texture's slides takes at \
-                         least \
-                         two"
+                         least two"
                     )),
                 });
             }

@@ -68,7 +68,7 @@ fn made_before() -> &'static [u8] {
     BROUGHT.get().map_or(BUILT_IN, Vec::as_slice)
 }
 
-/// Brings the trials of [`WORLD`] to a program without them, before anything asks for them; once is enough.
+/// Brings the trials of world 1 to a program without them, before anything asks for them; once is enough.
 pub fn bring_world(trials: Vec<u8>) {
     // the first ones are the same
     let _ = BROUGHT.set(trials);

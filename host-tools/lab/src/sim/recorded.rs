@@ -66,8 +66,7 @@ impl RecordedTexture {
                         let number = slide.number;
                         RecordingError::said(format!(
                             "slide {number} of {name} has no shear at {SHEAR_HZ} Hz; play recordings with a force \
-                             sensor of \
-                             that rate"
+                             sensor of that rate"
                         ))
                     })
                 })

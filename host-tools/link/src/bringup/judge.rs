@@ -214,7 +214,7 @@ fn opens(look: &Look, pin: Pin) -> bool {
     }
 }
 
-/// Each of [`SWITCHES`] before, while and after it was pressed by hand.
+/// Each switch before, while and after it was pressed by hand.
 pub fn switches(looks: &[[Look; 2]; 4]) -> Finding {
     let mut saw = Vec::new();
     let mut finding = Finding::default();

@@ -38,12 +38,6 @@ impl World {
         self.holder = Some(Holder::Hand(Box::new(hand)));
     }
 
-    /// The finger is on the lever again, wherever that is.
-    pub fn put_back(&mut self) {
-        self.finger.held = Held::STILL;
-        self.holder = None;
-    }
-
     /// The hand that holds the finger.
     pub fn hand(&mut self) -> Option<&mut Hand> {
         match &mut self.holder {

@@ -11,7 +11,7 @@ use crate::table::{Name, Table};
 pub enum Choice {
     /// The texture with this index.
     Known(u16),
-    /// A new one, named by [`free_name`].
+    /// A new one, with the first free number as its name.
     Numbered,
     /// A new one, or a known one, of this name.
     Spelled(Name),

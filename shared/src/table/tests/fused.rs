@@ -134,7 +134,8 @@ proptest! {
     #![proptest_config(fixed(512))]
 
     #[test]
-    fn no_bytes_behind_a_fused_header_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), set in 0u8..4, features in 0u8..15) {
+    fn no_bytes_behind_a_fused_header_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300),
+        set in 0u8..4, features in 0u8..15) {
         let length = (16 + bytes.len() + CRC_BYTES) as u32;
         let mut begun = b"TACT\x01\0\x01".to_vec();
         begun.push(set);

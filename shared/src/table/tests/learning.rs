@@ -7,7 +7,8 @@ proptest! {
     #![proptest_config(fixed(128))]
 
     #[test]
-    fn learning_is_the_mean_and_deviation(trials in proptest::collection::vec([-8f32..8.0, -16f32..16.0, 5.99f32..6.0], 2..255)) {
+    fn learning_is_the_mean_and_deviation(
+        trials in proptest::collection::vec([-8f32..8.0, -16f32..16.0, 5.99f32..6.0], 2..255)) {
         let experience = learned(&trials);
         prop_assert_eq!(usize::from(experience.trials()), trials.len());
         for property in Property::ALL {
@@ -19,7 +20,8 @@ proptest! {
     }
 
     #[test]
-    fn learning_goes_on_from_a_table(before in proptest::collection::vec([-2f32..2.0, -2f32..2.0, -2f32..2.0], 1..9), after in proptest::collection::vec([-2f32..2.0, -2f32..2.0, -2f32..2.0], 1..9)) {
+    fn learning_goes_on_from_a_table(before in proptest::collection::vec([-2f32..2.0, -2f32..2.0, -2f32..2.0], 1..9),
+        after in proptest::collection::vec([-2f32..2.0, -2f32..2.0, -2f32..2.0], 1..9)) {
         let bytes = encoded(&[("felt", vec![Experience::default(), learned(&before)])]).unwrap();
         let mut experience = Table::read(&bytes).unwrap().experience(0, 1);
         for trial in &after {

@@ -57,7 +57,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR", conflicts_with = "recordings")]
     pub(crate) fabrics: Option<PathBuf>,
     /// The repetition of the fabrics to learn from, 1 or 2; the other one is tested
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics", value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics",
+        value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(crate) repetition: u8,
     /// Folder to take the test slides from; training slides still come from --recordings
     #[arg(long, value_name = "DIR", conflicts_with_all = ["properties", "fabrics"])]

@@ -4,10 +4,11 @@
 use std::num::NonZeroU64;
 use std::path::Path;
 
-use tactus_core::wire::{Command, Counts, Event, Identify};
+use tactus_core::wire::{Command, Counts, Event};
 use tactus_link::Request;
 use tactus_world::world::Setup;
 
+use super::one_slide;
 use crate::board::{Emulator, Options, Timing};
 use crate::host::talk::{Talk, TalkError};
 
@@ -92,14 +93,7 @@ pub fn slowed(elf: &Path, by: f64) -> Result<Slowed, TalkError> {
     talk.board().timing()?;
     let begun_ns = talk.now_ns();
     let mut verdict = false;
-    let identify = Identify {
-        threshold: 1.0,
-        max_slides: 1,
-        open: false,
-        seed: 1,
-        ..Identify::default()
-    };
-    talk.send(Command::Identify(identify), TIMEOUT_S, |_, report| {
+    talk.send(Command::Identify(one_slide()), TIMEOUT_S, |_, report| {
         verdict |= matches!(report.map(|report| &report.event), Some(Event::Verdict(_)));
     })?;
     let seconds = (talk.now_ns() - begun_ns) as f64 * 1e-9;

@@ -133,8 +133,7 @@ impl Manifest {
                 let (slides, values) = (entry.n_slides, record.values);
                 let cause = format!(
                     "bytes_raw is {}, but slides ({slides}) of {values} 16-bit values are not that many bytes; they \
-                     must \
-                     agree",
+                     must agree",
                     entry.bytes_raw
                 );
                 return Err(fault(&place, cause));

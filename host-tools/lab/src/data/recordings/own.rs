@@ -172,8 +172,7 @@ impl Entry {
             if version != VERSION {
                 let cause = format!(
                     "version {version}, and this program reads version {VERSION}: write the recordings anew, or use \
-                     the \
-                     program that wrote them"
+                     the program that wrote them"
                 );
                 return Err(row.error(Some("version"), cause));
             }

@@ -80,7 +80,7 @@ impl RecordingWriter {
         self
     }
 
-    /// As [`labelled`](Self::labelled).
+    /// Gives these labels to the slides to come.
     pub fn label(&mut self, labels: Labels) {
         self.labels = labels;
     }
