@@ -63,6 +63,26 @@ impl Movement {
     /// Movement 3 of the study: 0.20 N, 6.31 cm/s, the most useful one for roughness.
     pub const FOR_ROUGHNESS: Self = Self::on_grid(100_000, 630_957);
 
+    /// The movement of a recording that does not say how it was made: no rig makes it.
+    pub const UNKNOWN: Self = Self {
+        force_mn: 0,
+        speed_um_s: 0,
+    };
+
+    /// Returns whether force and speed are known.
+    pub fn is_known(self) -> bool {
+        self != Self::UNKNOWN
+    }
+
+    /// As [`Movement::new`], or [`Movement::UNKNOWN`] from two zeros: as tables and recordings have it.
+    /// Errors: the first value that is out of its range.
+    pub const fn stored(force_mn: u16, speed_um_s: u32) -> Result<Self, MovementError> {
+        match (force_mn, speed_um_s) {
+            (0, 0) => Ok(Self::UNKNOWN),
+            _ => Self::new(force_mn, speed_um_s),
+        }
+    }
+
     /// A movement of `force_mn` millinewtons and `speed_um_s` micrometres per second.
     /// Errors: the first value that is out of its range.
     #[inline(never)]
@@ -152,6 +172,9 @@ impl Movement {
 
 impl fmt::Display for Movement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.is_known() {
+            return f.write_str("unknown");
+        }
         // as core prints an f32, to the nearest and then the even one: with core that takes the chip 9 KB
         let nearest = |value: f32, parts: f64| libm::rint(f64::from(value) * parts) as u32;
         let hundredths_n = nearest(self.force_n(), 100.0);

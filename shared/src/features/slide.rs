@@ -81,6 +81,7 @@ pub struct Slide<'p> {
     /// Sum of P_DC and of its squares, and their number.
     pdc: (i64, u64, u32),
     pace: Option<i16>,
+    bands: usize,
     lost: u32,
 }
 
@@ -102,6 +103,7 @@ impl<'p> Slide<'p> {
             shears: 0,
             pdc: (0, 0, 0),
             pace: None,
+            bands: FUSED_BANDS,
             lost: 0,
         }
     }
@@ -129,6 +131,7 @@ impl<'p> Slide<'p> {
         (self.shear_mn, self.shears) = (other.shear_mn, other.shears);
         self.pdc = other.pdc;
         self.pace = other.pace;
+        self.bands = other.bands;
         self.lost = other.lost;
     }
 
@@ -219,6 +222,13 @@ impl<'p> Slide<'p> {
         self.pace = pace;
     }
 
+    /// Leaves out the bands that reach over the highest frequency that was measured, Hz.
+    pub fn set_highest(&mut self, hz: f32) {
+        let highest = hz * FRAME as f32 / crate::sensor::pressure::RATE_HZ as f32;
+        let upper = FUSED_EDGES.iter().skip(1);
+        self.bands = upper.take_while(|edge| **edge as f32 <= highest).count();
+    }
+
     /// The properties, when the steady part is over.
     pub fn finish(mut self) -> Result<Measurement, SlideError> {
         self.look(self.steady.end.saturating_sub(self.steady.start))
@@ -259,6 +269,7 @@ impl<'p> Slide<'p> {
             roughness_is_bound,
             pdc: mean_and_sd(self.pdc),
             pace: self.pace,
+            bands: self.bands,
             background,
             spectrum,
         })
@@ -287,6 +298,8 @@ pub struct Measurement {
     pub pdc: Option<(f32, f32)>,
     /// See [`Observation::pace`](super::observation::Observation::pace).
     pub pace: Option<i16>,
+    /// Number of the bands of [`FUSED_EDGES`], from the lowest, that were measured.
+    pub bands: usize,
     /// Power of the still finger in counts^2.
     pub background: f32,
     /// Averaged spectrum of the unfiltered P_AC, window mean removed.

@@ -19,6 +19,8 @@ impl FingerCode {
     pub const BIOTAC: Self = Self::of(FingerName::Biotac);
     /// Of the `mems`.
     pub const MEMS: Self = Self::of(FingerName::Mems);
+    /// A sensor of somebody else: a table says its name, and no probe has it.
+    pub const OTHER: Self = Self(u8::MAX);
 
     /// The number of a finger: its place among [`FingerName::ALL`].
     pub const fn of(finger: FingerName) -> Self {

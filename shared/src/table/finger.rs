@@ -6,8 +6,9 @@ use super::sections::FINGER;
 use super::view::Table;
 use crate::sensor::FingerCode;
 
-/// Bytes that the section takes.
-pub const FINGER_LENGTH: usize = 4 + 5;
+/// Bytes that the section takes without a sensor's name.
+pub const FINGER_LENGTH: usize = 4 + NAME;
+const NAME: usize = 5;
 
 impl Table<'_> {
     /// The finger that it was learned with.
@@ -25,6 +26,13 @@ impl Table<'_> {
         date.map_or(0, u32::from_le_bytes)
     }
 
+    /// Name of the sensor that it was learned with, where that is [`FingerCode::OTHER`]; else empty.
+    pub fn sensor(&self) -> &str {
+        let section = self.section(FINGER).filter(|_| self.finger() == FingerCode::OTHER);
+        let name = section.and_then(|section| section.get(NAME..));
+        name.and_then(|name| core::str::from_utf8(name).ok()).unwrap_or_default()
+    }
+
     /// This table, if it was learned with this finger.
     pub fn of_finger(self, probe: FingerCode) -> Result<Self, TableError> {
         let table = self.finger();
@@ -36,16 +44,19 @@ impl Table<'_> {
     }
 }
 
-/// Writes `old` into `out`, with this finger and the day of its calibration in place of what it says of that.
+/// Writes `old` into `out`, with this finger, the day of its calibration, and for [`FingerCode::OTHER`] the sensor's
+/// name in place of what it says of that.
 pub fn with_finger<'o>(
     out: &'o mut [u8],
     old: &Table<'_>,
     finger: FingerCode,
     calibrated: u32,
+    sensor: &str,
 ) -> Result<Table<'o>, EncodeError> {
     let is_there = finger != FingerCode::BIOTAC || calibrated != 0;
     with_section(out, old, FINGER, is_there, |writer| {
         writer.put(&[finger.0]);
         writer.put(&calibrated.to_le_bytes());
+        writer.put(sensor.as_bytes());
     })
 }

@@ -86,6 +86,11 @@ impl<'a> Table<'a> {
         table.sections = body.get(end..).unwrap_or_default();
         table.check_sections()?;
         table.find_sections();
+        // a rig of ours is never told to make it
+        let unknown = table.movements().position(|movement| !movement.is_known());
+        if let Some(index) = unknown.filter(|_| table.finger() != FingerCode::OTHER) {
+            return Err(TableError::Movement(index as u8, MovementError::Force(0)));
+        }
         let lengths = table.count_lengths();
         let lengths = lengths.ok_or(TableError::Section(LENGTH))?;
         if lengths > 0 && table.is_paced() {
@@ -106,7 +111,7 @@ impl<'a> Table<'a> {
         }
         for index in 0..self.movements {
             let (force_mn, speed_um_s) = self.stored_movement(index).ok_or(length(at))?;
-            let movement = Movement::new(force_mn, speed_um_s)
+            let movement = Movement::stored(force_mn, speed_um_s)
                 .map_err(|why| TableError::Movement(index, why))?;
             if self.movements().take(index.into()).any(|m| m == movement) {
                 return Err(TableError::TwinMovement(index));
@@ -290,7 +295,7 @@ impl<'a> Table<'a> {
         let (force_mn, speed_um_s) = self
             .stored_movement(index)
             .filter(|_| index < self.movements)?;
-        Movement::new(force_mn, speed_um_s).ok()
+        Movement::stored(force_mn, speed_um_s).ok()
     }
 
     /// All (movement, property) pairs that there are Gaussians of, movement by movement, properties in the order of

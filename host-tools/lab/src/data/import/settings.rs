@@ -1,0 +1,249 @@
+//! What a file of signals does not say: options of the command, or `import.toml` beside the data.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::recordings::{RecordingError, Result, read_bounded};
+
+/// Name of the file of settings in the folder of the data.
+pub const SETTINGS: &str = "import.toml";
+const MAX_SETTINGS: u64 = 64 << 10;
+
+/// Settings of an import; what is `None` is found by looking at the data.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "arguments", derive(clap::Args))]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Samples per second, where the files have no time
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "HZ"))]
+    pub rate: Option<f64>,
+    /// Column of the time in s (ms, us if its name says so)
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN"))]
+    pub time: Option<String>,
+    /// Column or channel of the vibration, by name or number; the liveliest one by default
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN"))]
+    pub channel: Option<String>,
+    /// Unit of the vibration: counts, g, m/s2, V, Pa, N
+    #[cfg_attr(feature = "arguments", arg(long))]
+    pub unit: Option<String>,
+    /// Counts per unit; by default what fills 12 bits without clipping
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "COUNTS"))]
+    pub gain: Option<f64>,
+    /// Column of the contact's pressure (P_DC), a slow signal; none by default
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN"))]
+    pub pressure: Option<String>,
+    /// Column of the tangential force against the motion in N; none by default
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN"))]
+    pub shear: Option<String>,
+    /// Name of the texture: a column of words, or a pattern of paths: "{session}/{texture}_*.wav"
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN|PATTERN"))]
+    pub texture: Option<String>,
+    /// Session of all files
+    #[cfg_attr(feature = "arguments", arg(long))]
+    pub session: Option<String>,
+    /// Name of the sensor
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "NAME"))]
+    pub finger: Option<String>,
+    /// Contact force in N, if known
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "N"))]
+    pub force: Option<f32>,
+    /// Sliding speed in mm/s, if known
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "MM_S"))]
+    pub speed: Option<f32>,
+    /// Sliding from and to, in s from the start of each file: "0.5,3"
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "FROM,TO"))]
+    pub window: Option<String>,
+    /// Length of the slides into which longer sliding is divided, in s
+    #[cfg_attr(feature = "arguments", arg(long, value_name = "S"))]
+    pub length: Option<f64>,
+}
+
+const HELP: [(&str, &str, &str); 14] = [
+    ("rate", "1000.0", "samples per second, where the files have no time"),
+    ("time", "\"time_s\"", "column of the time in s (ms or us if its name says so)"),
+    ("channel", "\"z\"", "column or channel of the vibration, by name or number"),
+    ("unit", "\"m/s2\"", "counts, g, m/s2, V, Pa, N"),
+    ("gain", "100.0", "counts per unit"),
+    ("pressure", "\"force_n\"", "column of the contact's pressure (P_DC)"),
+    ("shear", "\"fx_n\"", "column of the tangential force against the motion, N"),
+    ("texture", "\"{session}/{texture}_*.csv\"", "a column of words, or a pattern of paths"),
+    ("session", "\"monday\"", "session of all files"),
+    ("finger", "\"my-sensor\"", "name of the sensor"),
+    ("force", "0.5", "contact force, N"),
+    ("speed", "25.0", "sliding speed, mm/s"),
+    ("window", "\"0.5,3\"", "sliding from and to, s from the start of each file"),
+    ("length", "3.0", "length of the slides into which longer sliding is divided, s"),
+];
+
+impl Settings {
+    /// These, and for what they leave open those of the file in a folder, if there is one.
+    /// Errors: The file is none of settings.
+    pub fn with_file(self, folder: &Path) -> Result<Self> {
+        let path = folder.join(SETTINGS);
+        if !path.is_file() {
+            return Ok(self);
+        }
+        let bytes = read_bounded(&path, MAX_SETTINGS)?;
+        let text = String::from_utf8(bytes).map_err(|why| RecordingError::at(&path, why))?;
+        let file: Self = toml::from_str(&text).map_err(|why| {
+            let place = why.span().map(|span| text[..span.start].lines().count().max(1));
+            let place = place.map(|line| format!("line {line}: ")).unwrap_or_default();
+            RecordingError::at(&path, format!("{place}{}", why.message()))
+        })?;
+        Ok(Self {
+            rate: self.rate.or(file.rate),
+            time: self.time.or(file.time),
+            channel: self.channel.or(file.channel),
+            unit: self.unit.or(file.unit),
+            gain: self.gain.or(file.gain),
+            pressure: self.pressure.or(file.pressure),
+            shear: self.shear.or(file.shear),
+            texture: self.texture.or(file.texture),
+            session: self.session.or(file.session),
+            finger: self.finger.or(file.finger),
+            force: self.force.or(file.force),
+            speed: self.speed.or(file.speed),
+            window: self.window.or(file.window),
+            length: self.length.or(file.length),
+        })
+    }
+
+    /// The file of these settings: each with a line that says what it is, those that are open as comments.
+    pub fn template(&self) -> String {
+        let given = toml::Table::try_from(self).unwrap_or_default();
+        let lines = HELP.iter().map(|(key, example, what)| match given.get(*key) {
+            Some(value) => format!("# {what}\n{key} = {value}\n"),
+            None => format!("# {what}\n# {key} = {example}\n"),
+        });
+        let head = "# What the files of this folder do not say, for `tactus import`.\n\n";
+        head.to_owned() + &lines.collect::<String>()
+    }
+
+    /// Sliding from and to, s.
+    pub(super) fn window(&self) -> std::result::Result<Option<(f64, f64)>, String> {
+        let Some(window) = &self.window else {
+            return Ok(None);
+        };
+        let wrong = || format!("window {window:?} is not FROM,TO in seconds, as 0.5,3");
+        let (from, to) = window.split_once(',').ok_or_else(wrong)?;
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|s| s.is_finite());
+        match number(from).zip(number(to)) {
+            Some((from, to)) if 0.0 <= from && from < to => Ok(Some((from, to))),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// What a path says of its recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Named {
+    pub texture: String,
+    pub session: String,
+}
+
+/// The parts of a path by a pattern such as `{session}/{texture}_*.wav`; a star stands for anything but a slash.
+pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
+    fn go(pattern: &str, path: &str, mut named: Named) -> Option<Named> {
+        let (field, rest) = if let Some(rest) = pattern.strip_prefix('*') {
+            ("", rest)
+        } else if let Some((field, rest)) =
+            pattern.strip_prefix('{').and_then(|rest| rest.split_once('}'))
+        {
+            (field, rest)
+        } else {
+            let Some(wanted) = pattern.chars().next() else {
+                return path.is_empty().then_some(named);
+            };
+            let rest = path.strip_prefix(wanted)?;
+            return go(&pattern[wanted.len_utf8()..], rest, named);
+        };
+        // the shortest that fits, at least one letter for a field
+        let ends = path.char_indices().map(|(at, _)| at).chain([path.len()]);
+        for end in ends {
+            let (value, after) = path.split_at(end);
+            if value.contains('/') {
+                return None;
+            }
+            if !field.is_empty() && value.is_empty() {
+                continue;
+            }
+            match field {
+                "texture" => value.clone_into(&mut named.texture),
+                "session" => value.clone_into(&mut named.session),
+                _ => {}
+            }
+            if let found @ Some(_) = go(rest, after, named.clone()) {
+                return found;
+            }
+        }
+        None
+    }
+    go(pattern, path, Named::default()).filter(|named| !named.texture.is_empty())
+}
+
+/// What a path says without a pattern: the folder is the texture, and one of a session above or below it; without
+/// folders, the file's name without the number at its end.
+pub(super) fn guessed(path: &str) -> Named {
+    let mut folders: Vec<&str> = path.split('/').collect();
+    let file = folders.pop().unwrap_or_default();
+    let is_session = |name: &&str| {
+        let letters = name.trim_end_matches(|c: char| c.is_ascii_digit() || "-_ .".contains(c));
+        let words = ["", "day", "session", "sess", "s", "run", "r", "d"];
+        name.ends_with(|c: char| c.is_ascii_digit()) && words.contains(&letters.to_lowercase().as_str())
+    };
+    let session = folders.iter().copied().find(|f| is_session(f)).unwrap_or_default();
+    let texture = folders.iter().rev().copied().find(|f| !is_session(f));
+    let stem = || {
+        let stem = file.strip_suffix(".gz").unwrap_or(file);
+        let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
+        let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+        let bare = bare.trim_end_matches(['_', '-', ' ', '.', '#']);
+        if bare.is_empty() { stem } else { bare }
+    };
+    Named {
+        texture: texture.unwrap_or_else(stem).to_owned(),
+        session: session.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_say_texture_and_session() {
+        for (path, texture, session) in [
+            ("cotton/1.wav", "cotton", ""),
+            ("day1/cotton/1.wav", "cotton", "day1"),
+            ("cotton/2026-11-28/a.csv", "cotton", "2026-11-28"),
+            ("denim_12.csv.gz", "denim", ""),
+            ("007.csv", "007", ""),
+        ] {
+            let named = guessed(path);
+            assert_eq!((named.texture.as_str(), named.session.as_str()), (texture, session));
+        }
+        let named = matched("{session}/*_{texture}-*.wav", "monday/x_silk-03.wav").unwrap();
+        assert_eq!((named.texture.as_str(), named.session.as_str()), ("silk", "monday"));
+        assert_eq!(matched("{texture}/*.wav", "a/b/c.wav"), None);
+        assert_eq!(matched("{texture}*.csv", "é1.csv").unwrap().texture, "é");
+    }
+
+    #[test]
+    fn a_template_is_read_as_it_was_written() {
+        let given = Settings {
+            rate: Some(999.5),
+            texture: Some("{texture}/*".to_owned()),
+            ..Settings::default()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(SETTINGS), given.template()).unwrap();
+        assert_eq!(Settings::default().with_file(folder.path()).unwrap(), given);
+        // every line that is a comment is a setting, too
+        let all = Settings::default().template().replace("# r", "r");
+        assert!(all.contains("\nrate = 1000.0"));
+        std::fs::write(folder.path().join(SETTINGS), "rate = 1\nrat = 2").unwrap();
+        let why = Settings::default().with_file(folder.path()).unwrap_err().to_string();
+        assert!(why.contains("line 2") && why.contains("rat"), "{why}");
+    }
+}
