@@ -2,6 +2,7 @@
 
 mod convert;
 mod device;
+mod import;
 mod kills;
 mod offline;
 mod refusals;
@@ -103,7 +104,9 @@ impl Scratch {
     }
 
     fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
-        fs::write(self.path(name), bytes).unwrap();
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
     }
 
     /// Copies the recordings that come with the command to a folder, with other lines of the manifest.

@@ -203,7 +203,7 @@ fn lengths() -> Vec<u8> {
         [None, Some(false), Some(true)][usize::from(texture)]
     });
     let (finger, day) = FINGER;
-    let named = table::with_finger(named, &moved.unwrap(), finger, day).unwrap();
+    let named = table::with_finger(named, &moved.unwrap(), finger, day, "").unwrap();
     named.as_bytes().to_vec()
 }
 

@@ -64,7 +64,7 @@ impl Recordings {
         if self.measured.get().is_none() {
             let set = &self.set;
             let folder = set.folder().display();
-            set.finger()
+            set.sensor()
                 .map_err(|why| why.raise_of(folder.to_string()))?;
             let all = work(py, |between| {
                 let all = measure_all(set, |_| between());
@@ -131,8 +131,8 @@ impl Recordings {
     /// fingers.
     #[getter]
     fn finger(&self) -> PyResult<(String, u32)> {
-        let (finger, calibrated) = self.set.finger().map_err(|why| why.raise())?;
-        Ok((finger.to_string(), calibrated))
+        let sensor = self.set.sensor().map_err(|why| why.raise())?;
+        Ok((sensor.to_string(), sensor.calibrated))
     }
 
     /// Reads the slides of a texture (its name or its number) with their samples, in the order of time: a list of

@@ -133,7 +133,13 @@ impl From<&Measurement> for Observation {
         });
         Self {
             properties: slide.properties,
-            bands: up_to(slide.fused_bands().into_iter().take(slide.bands).filter_map(fixed)),
+            bands: up_to(
+                slide
+                    .fused_bands()
+                    .into_iter()
+                    .take(slide.bands)
+                    .filter_map(fixed),
+            ),
             pressure,
             pace: slide.pace,
         }

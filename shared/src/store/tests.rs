@@ -234,7 +234,14 @@ fn a_table_of_another_finger_is_refused_and_the_former_one_stays() {
     block_on(push(&mut store, &old, 16)).unwrap();
     let [mems, biotac] = [FingerCode::MEMS, FingerCode::BIOTAC];
     let mut other = vec![0; old.len() + FINGER_LENGTH];
-    let named = with_finger(&mut other, &Table::read(&old).unwrap(), mems, 20_261_124).unwrap();
+    let named = with_finger(
+        &mut other,
+        &Table::read(&old).unwrap(),
+        mems,
+        20_261_124,
+        "",
+    )
+    .unwrap();
     assert_eq!((named.finger(), named.calibrated()), (mems, 20_261_124));
     let commit = |store: &mut Store<Ram<SECTOR>>, finger| {
         let mut buffer = [0; SECTOR];

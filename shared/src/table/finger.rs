@@ -2,8 +2,10 @@
 
 use super::encode::{EncodeError, with_section};
 use super::format::{TableError, array};
+use super::name::valid_name;
 use super::sections::FINGER;
 use super::view::Table;
+use crate::features::MovementError;
 use crate::sensor::FingerCode;
 
 /// Bytes that the section takes without a sensor's name.
@@ -28,20 +30,37 @@ impl Table<'_> {
 
     /// Name of the sensor that it was learned with, where that is [`FingerCode::OTHER`]; else empty.
     pub fn sensor(&self) -> &str {
-        let section = self.section(FINGER).filter(|_| self.finger() == FingerCode::OTHER);
+        let section = self
+            .section(FINGER)
+            .filter(|_| self.finger() == FingerCode::OTHER);
         let name = section.and_then(|section| section.get(NAME..));
-        name.and_then(|name| core::str::from_utf8(name).ok()).unwrap_or_default()
+        name.and_then(|name| core::str::from_utf8(name).ok())
+            .unwrap_or_default()
     }
 
-    /// This table, if it was learned with this finger.
+    /// This table, if it was learned with this finger, and its movements are known: a rig is to make them.
     pub fn of_finger(self, probe: FingerCode) -> Result<Self, TableError> {
         let table = self.finger();
-        if table == probe {
-            Ok(self)
-        } else {
-            Err(TableError::Finger { table, probe })
+        if table != probe {
+            return Err(TableError::Finger { table, probe });
+        }
+        let mut movements = self.movements().zip(0..);
+        match movements.find(|(movement, _)| !movement.is_known()) {
+            Some((_, index)) => Err(TableError::Movement(index, MovementError::Force(0))),
+            None => Ok(self),
         }
     }
+}
+
+/// Returns whether a section says a finger and a day, and the name of the sensor exactly where it is another's.
+pub(super) fn is_finger(section: &[u8]) -> bool {
+    section.split_at_checked(NAME).is_some_and(|(head, name)| {
+        let is_other = head.first() == Some(&FingerCode::OTHER.0);
+        match core::str::from_utf8(name) {
+            Ok(name) if is_other => valid_name(name).is_ok(),
+            _ => !is_other && name.is_empty(),
+        }
+    })
 }
 
 /// Writes `old` into `out`, with this finger, the day of its calibration, and for [`FingerCode::OTHER`] the sensor's

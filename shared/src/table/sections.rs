@@ -4,8 +4,8 @@ use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
 use super::encode::{EncodeError, Writer};
-use super::finger::FINGER_LENGTH;
-use super::format::{DRIFT, HEAD, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
+use super::finger::is_finger;
+use super::format::{DRIFT, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
@@ -140,7 +140,7 @@ impl<'a> Table<'a> {
                 DRIFT => are_drifts(contents, features, movements),
                 NOVELTY => are_limits(contents, features, movements),
                 SLOPES => slopes::are_slopes(contents, features, self.textures.into(), movements),
-                FINGER => contents.len() == FINGER_LENGTH - HEAD,
+                FINGER => is_finger(contents),
                 _ => continue,
             };
             let bit = 1 << kind;

@@ -100,11 +100,6 @@ impl<'a> Table<'a> {
         table.sections = body.get(end..).unwrap_or_default();
         table.check_sections()?;
         table.find_sections();
-        // a rig of ours is never told to make it
-        let unknown = table.movements().position(|movement| !movement.is_known());
-        if let Some(index) = unknown.filter(|_| table.finger() != FingerCode::OTHER) {
-            return Err(TableError::Movement(index as u8, MovementError::Force(0)));
-        }
         let lengths = table.count_lengths();
         let lengths = lengths.ok_or(TableError::Section(LENGTH))?;
         if lengths > 0 && table.is_paced() {

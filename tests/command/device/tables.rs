@@ -40,7 +40,7 @@ fn a_table_is_checked_pushed_and_pulled() {
     damaged[40] ^= 1;
     bench.at.write("bad", damaged);
     assert_says(&bench.error("table push bad"), &["checksum"]);
-    let mems = tactus_lab::eval::learn::name_finger(&other, FingerCode::MEMS, 20_261_124);
+    let mems = tactus_lab::eval::learn::name_finger(&other, FingerCode::MEMS, 20_261_124, "");
     bench.at.write("bad", mems.unwrap());
     let said = bench.error("table push bad");
     assert_says(

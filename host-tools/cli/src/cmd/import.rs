@@ -3,28 +3,60 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use tactus_lab::data;
+use anyhow::Context as _;
+use tactus_lab::data::import::foreign::{Found, Survey};
+use tactus_lab::data::import::settings::{SETTINGS, Settings};
+use tactus_lab::data::import::{self, is_known};
 use tactus_lab::eval::show::count;
 
 use super::progress::progress;
 
-/// Convert recordings into the project's format (.npy files and a CSV manifest)
+/// Most files that are drawn.
+const DRAWN: usize = 8;
+
+/// Bring recordings of any sensor: WAV, CSV, numpy arrays, or a published data set
 #[derive(clap::Args)]
 #[command(after_help = "\
+What the files do not say is found by looking at them, and told. What cannot be found is asked for; give it as an
+option, or in the file import.toml beside the data, which a first look writes with --template.
+
+The texture is the folder of a file, or its name without the number at the end, or what --texture says; folders such
+as day2 or session-1 are sessions. Long sliding is divided into slides, which are marked as of one run.
+
 Examples:
+  tactus import my-wavs recordings                      # cotton/1.wav, cotton/2.wav, silk/1.wav ...
+  tactus import log.csv recordings --texture material   # a column of words names the texture
+  tactus import data recordings --rate 1000 --channel z --texture '{session}/{texture}_*.csv'
+  tactus import data recordings --dry-run               # shows what was found, and writes nothing
   git clone https://github.com/dexrob/BioTac_slide_20_50
   tactus import BioTac_slide_20_50 recordings")]
 pub(crate) struct Args {
-    /// A folder in the layout of data/biotac, or the publisher's folders of CSV files
+    /// A file, a folder of files, or a published data set
     from: PathBuf,
     /// The folder to write; it must not hold recordings yet
-    to: PathBuf,
+    #[arg(required_unless_present_any = ["dry_run", "template"])]
+    to: Option<PathBuf>,
+    /// Show what was found, and write nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Write import.toml with what was found, to be corrected, and nothing else
+    #[arg(long, conflicts_with = "dry_run")]
+    template: bool,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let Args { from, to } = args;
+    match &args.to {
+        Some(to) if is_known(&args.from) => known(args, to, out),
+        _ => signals(args, out),
+    }
+}
+
+/// A layout that says everything itself.
+fn known(args: &Args, to: &std::path::Path, out: &mut impl Write) -> anyhow::Result<()> {
     let bar = progress(0, "importing slides");
-    let imported = data::import::import(from, to, &mut |done, all| {
+    let imported = import::import(&args.from, to, &mut |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;
@@ -40,4 +72,150 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         )?;
     }
     Ok(())
+}
+
+fn signals(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let bar = progress(0, "looking at files");
+    let survey = Survey::of(&args.from, args.settings.clone(), &|done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    let survey = survey?;
+    tell(&survey, out)?;
+    if args.template {
+        let folder = match args.from.is_dir() {
+            true => args.from.as_path(),
+            false => args.from.parent().unwrap_or(&args.from),
+        };
+        let path = folder.join(SETTINGS);
+        anyhow::ensure!(
+            !path.exists(),
+            "{} is there already; change it, or remove it first",
+            path.display()
+        );
+        tactus_lab::data::whole::write_whole(&path, survey.settings().template())
+            .with_context(|| path.display().to_string())?;
+        writeln!(out, "{}: correct it, then import again", path.display())?;
+        return Ok(());
+    }
+    let Some(to) = args.to.as_ref().filter(|_| !args.dry_run) else {
+        writeln!(out, "nothing is written (--dry-run)")?;
+        return Ok(());
+    };
+    let bar = progress(survey.slides() as u64, "writing slides");
+    survey.write(to, &|done, _| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    writeln!(out, "{}: written", to.display())?;
+    Ok(())
+}
+
+/// What was found, as a picture and a table.
+fn tell(survey: &Survey, out: &mut impl Write) -> anyhow::Result<()> {
+    let files = count(survey.found.len() as u64, "recording");
+    writeln!(
+        out,
+        "{files} ({}), {} Hz",
+        survey.kind,
+        figures(survey.rate_hz)
+    )?;
+    if survey.is_stretched() {
+        writeln!(
+            out,
+            "  too slow for vibration of a fingertip: its clock is taken for one of 2200 Hz, frequencies appear {} \
+             times as high",
+            figures(2200.0 / survey.rate_hz)
+        )?;
+    } else if survey.rate_hz < 2200.0 {
+        let highest = survey.rate_hz / 2.0;
+        writeln!(
+            out,
+            "  nothing over {} Hz was measured; bands above are left out",
+            figures(highest)
+        )?;
+    }
+    writeln!(
+        out,
+        "  channel {}, {} counts per unit",
+        survey.channel,
+        figures(survey.gain)
+    )?;
+    let still = survey.found.iter().filter(|found| found.still).count();
+    match still {
+        0 => writeln!(
+            out,
+            "  no still part in any: the sensor's background is not measured"
+        )?,
+        n => writeln!(out, "  a still part, the background, in {n} of them")?,
+    }
+    let gaps: Vec<&Found> = survey.found.iter().filter(|found| found.gaps > 0).collect();
+    for found in &gaps {
+        let slides = count(found.gaps as u64, "slide");
+        writeln!(
+            out,
+            "  {}: {slides} left out, samples are missing in the middle",
+            found.path
+        )?;
+    }
+    for found in survey.found.iter().take(DRAWN) {
+        writeln!(out, "{} ({:.1} s)", found.path, found.seconds)?;
+        writeln!(out, "  {}", envelope(found))?;
+        writeln!(out, "  {}", marks(found))?;
+    }
+    if survey.found.len() > DRAWN {
+        writeln!(out, "... and {} more", survey.found.len() - DRAWN)?;
+    }
+    writeln!(
+        out,
+        "{:<40} {:>10} {:>8} {:>8}",
+        "texture", "recordings", "slides", "sessions"
+    )?;
+    for texture in &survey.textures {
+        let of: Vec<&Found> = survey
+            .found
+            .iter()
+            .filter(|f| f.texture == *texture)
+            .collect();
+        let slides: usize = of.iter().map(|f| f.slides.len()).sum();
+        let sessions: std::collections::BTreeSet<&str> = of
+            .iter()
+            .map(|f| f.session.as_str())
+            .filter(|s| !s.is_empty())
+            .collect();
+        writeln!(
+            out,
+            "{texture:<40} {:>10} {slides:>8} {:>8}",
+            of.len(),
+            sessions.len()
+        )?;
+    }
+    Ok(())
+}
+
+/// Three figures.
+fn figures(x: f64) -> String {
+    match x.abs() {
+        100.0.. => format!("{x:.0}"),
+        1.0.. => format!("{x:.1}"),
+        _ => format!("{x:.3}"),
+    }
+}
+
+fn envelope(found: &Found) -> String {
+    const STEPS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let step = |x: &f32| STEPS[((x * 8.0) as usize).min(7)];
+    found.envelope.iter().map(step).collect()
+}
+
+fn marks(found: &Found) -> String {
+    let width = found.envelope.len();
+    let mut line = vec![' '; width];
+    for (from, to) in &found.slides {
+        let at = |part: &f32| ((part * width as f32) as usize).min(width);
+        let (from, to) = (at(from), at(to));
+        for (place, mark) in line.iter_mut().enumerate().take(to).skip(from) {
+            *mark = if place == from { '|' } else { '-' };
+        }
+    }
+    line.into_iter().collect::<String>().trim_end().to_owned()
 }

@@ -16,7 +16,7 @@ pub(crate) fn measure_folder(
     folder: &Path,
 ) -> anyhow::Result<(RecordingSet, Vec<Vec<MeasuredSlide>>)> {
     let set = RecordingSet::open(folder)?;
-    set.finger().with_context(|| folder.display().to_string())?;
+    set.sensor().with_context(|| folder.display().to_string())?;
     let textures = set.textures().len() as u64;
     let measured = with_progress(textures, "measuring slides", |done| {
         measure_all(&set, |_| done())
@@ -27,9 +27,7 @@ pub(crate) fn measure_folder(
 
 /// That slides of this folder can be compared with those that a table was learned from.
 pub(crate) fn of_one_finger(set: &RecordingSet, table: Table<'_>) -> anyhow::Result<()> {
-    let (finger, _) = set.finger()?;
-    table.of_finger(finger).context("the table")?;
-    Ok(())
+    Ok(set.sensor()?.suits(&table)?)
 }
 
 /// Index of the texture that is meant by a number or a name.

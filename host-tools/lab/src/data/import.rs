@@ -31,6 +31,11 @@ use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result, is_there};
 use crate::data::rows::Rows;
 
+mod cut;
+pub mod foreign;
+mod resample;
+pub mod settings;
+pub mod signals;
 pub mod signs;
 
 const SPEED_UM_S: u32 = 25_000;
@@ -49,6 +54,14 @@ pub struct Imported {
     pub slides: usize,
     /// Rows of 10 ms that the publisher's files lack, by their timestamps: the samples before and after are joined.
     pub lost_rows: usize,
+}
+
+/// Returns true if a folder has one of the layouts that say everything themselves: the project's own, that of
+/// `data/biotac`, or the publisher's files.
+pub fn is_known(from: &Path) -> bool {
+    let raw = from.join("raw_data");
+    let raw = if raw.is_dir() { raw } else { from.to_owned() };
+    is_there(from) || materials(&raw).is_ok_and(|materials| !materials.is_empty())
 }
 
 /// Converts the recordings in the folder `from` to the project's own format in the folder `to`; an interrupted import
@@ -215,6 +228,7 @@ impl SlideFiles {
             outside_mn: None,
             pace: None,
             shear_rate_hz: ROW_RATE_HZ,
+            highest_hz: None,
         };
         let imported = |why| {
             fault(format!(

@@ -24,9 +24,10 @@ pub struct Recording {
     pub window: (f32, f32),
     /// P_AC at [`PAC_RATE_HZ`] of the still finger and of the slide, and the tangential force at constant speed.
     pub blocks: Vec<Block>,
-    /// Power of the still finger in counts^2 after the band-pass, where its samples are not recorded.
+    /// Power of the still finger in counts^2 after the band-pass, where its samples are not recorded; 0 where it was
+    /// not measured.
     pub background: Option<f32>,
-    /// P_DC in counts about the still baseline, from the start of the record.
+    /// P_DC in counts about the still baseline, from the start of the record; empty if not measured.
     pub pdc: Vec<i16>,
     /// Rate of [`pdc`](Self::pdc) in Hz.
     pub pdc_rate_hz: u32,
@@ -37,6 +38,8 @@ pub struct Recording {
     pub pace: Option<i16>,
     /// Rate of the tangential force in Hz, also where there is none.
     pub shear_rate_hz: u32,
+    /// Highest frequency that the sensor measured, Hz, where that is less than P_AC's rate can carry.
+    pub highest_hz: Option<f32>,
 }
 
 /// One texture of a set.
@@ -70,8 +73,14 @@ pub struct Labels {
     pub note: String,
     /// True if the sample was moved or turned since the slide before.
     pub moved: Option<bool>,
+    /// The session, and the run of the rig in it; empty if unknown.
+    pub session: String,
+    /// See [`session`](Self::session).
+    pub run: String,
     /// The finger; a BioTac if unknown.
     pub finger: FingerCode,
+    /// Name of the sensor, where the finger is [`FingerCode::OTHER`].
+    pub sensor: String,
     /// Day on which that finger's force per count was measured, as 20261121; 1 if the day is unknown, 0 if it was not
     /// measured or that is unknown.
     pub calibrated: u32,
@@ -105,6 +114,7 @@ impl Recording {
             outside_mn: (inside > 0).then(|| [vec![0; before], vec![0; after]]),
             pace: None,
             shear_rate_hz: SHEAR_HZ,
+            highest_hz: None,
         };
         recording.check().is_ok().then_some(recording)
     }
@@ -144,6 +154,9 @@ impl Recording {
         let steady = self.pdc.get(self.steady(self.pdc_rate_hz));
         slide.push_pdc(steady.unwrap_or_default());
         slide.set_pace(self.pace);
+        if let Some(hz) = self.highest_hz {
+            slide.set_highest(hz);
+        }
     }
 
     /// The same slide, had it ended after so many ms at constant speed; `None` if it does not last longer.
@@ -199,7 +212,11 @@ impl Recording {
         }
         let streams = [
             ("P_AC", PAC_RATE_HZ, Some(self.pac().len())),
-            ("P_DC", self.pdc_rate_hz, Some(self.pdc.len())),
+            (
+                "P_DC",
+                self.pdc_rate_hz,
+                Some(self.pdc.len()).filter(|samples| *samples > 0),
+            ),
             (
                 "shear",
                 self.shear_rate_hz,

@@ -12,14 +12,63 @@ pub mod npy;
 pub mod own;
 mod writer;
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
+use tactus_core::table::Table;
 
 use crate::data::recording::{Labels, Recording, SlideKey, Texture};
-pub use files::{RecordingError, Result};
+pub use files::{RecordingError, Result, read_bounded};
 pub use writer::{RecordingWriter, files as files_of};
+
+/// The sensor of recordings or of a table.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Sensor {
+    /// The finger.
+    pub finger: FingerCode,
+    /// Its name, where that is [`FingerCode::OTHER`].
+    pub name: String,
+    /// Day of its calibration where it is the same of all, else 0.
+    pub calibrated: u32,
+}
+
+impl Sensor {
+    fn of(labels: &Labels) -> Self {
+        Self {
+            finger: labels.finger,
+            name: labels.sensor.clone(),
+            calibrated: labels.calibrated,
+        }
+    }
+
+    /// That slides of this sensor can be compared with a table.
+    /// Errors: the table was learned with another.
+    pub fn suits(&self, table: &Table<'_>) -> Result<()> {
+        let of_table = Self {
+            finger: table.finger(),
+            name: table.sensor().to_owned(),
+            calibrated: table.calibrated(),
+        };
+        if (of_table.finger, &of_table.name) == (self.finger, &self.name) {
+            return Ok(());
+        }
+        Err(RecordingError::said(format!(
+            "the table was learned with the sensor {of_table}, and the slides are of {self}: they cannot be compared; \
+             learn a table from slides of {self}"
+        )))
+    }
+}
+
+impl fmt::Display for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.finger {
+            FingerCode::OTHER => f.write_str(&self.name),
+            finger => finger.fmt(f),
+        }
+    }
+}
 
 /// The recordings of one folder.
 #[derive(Debug)]
@@ -94,27 +143,24 @@ impl RecordingSet {
         self.textures.iter().map(|t| t.name.clone()).collect()
     }
 
-    /// The finger that the slides were made with, and the day of its calibration, where it is the same of all, else 0.
-    /// Errors: they were made with two fingers.
-    pub fn finger(&self) -> Result<(FingerCode, u32)> {
-        let mut all = self.slides.iter().flatten();
-        let first = all.next().map(|key| &key.labels);
-        let (finger, mut calibrated) =
-            first.map_or_else(Default::default, |l| (l.finger, l.calibrated));
-        for Labels {
-            finger: other,
-            calibrated: date,
-            ..
-        } in all.map(|key| &key.labels)
-        {
-            if *other != finger {
-                return Err(RecordingError::two_fingers(finger, *other));
+    /// The sensor that the slides were made with.
+    /// Errors: they were made with two.
+    pub fn sensor(&self) -> Result<Sensor> {
+        let mut all = self
+            .slides
+            .iter()
+            .flatten()
+            .map(|key| Sensor::of(&key.labels));
+        let mut sensor = all.next().unwrap_or_default();
+        for other in all {
+            if (other.finger, &other.name) != (sensor.finger, &sensor.name) {
+                return Err(RecordingError::two_fingers(&sensor, &other));
             }
-            if *date != calibrated {
-                calibrated = 0;
+            if other.calibrated != sensor.calibrated {
+                sensor.calibrated = 0;
             }
         }
-        Ok((finger, calibrated))
+        Ok(sensor)
     }
 
     /// The movements of the set, in the order in which they are first seen.

@@ -99,6 +99,7 @@ pub fn learn_first(
         of_all(movements.iter().flat_map(of))
     };
     let noted = note(&bytes, |texture| moved(texture.into()))?;
-    let (finger, calibrated) = set.finger()?;
-    Ok(name_finger(&noted, finger, calibrated)?)
+    let sensor = set.sensor()?;
+    let named = name_finger(&noted, sensor.finger, sensor.calibrated, &sensor.name);
+    Ok(named?)
 }

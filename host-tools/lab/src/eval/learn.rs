@@ -109,19 +109,22 @@ impl Default for Expected {
     }
 }
 
-/// A table with the finger that its slides were made with, and the day of that finger's calibration.
+/// A table with the finger that its slides were made with, the day of that finger's calibration, and the name of a
+/// sensor of somebody else.
 /// Errors: these bytes are no table.
 pub fn name_finger(
     bytes: &[u8],
     finger: FingerCode,
     calibrated: u32,
+    sensor: &str,
 ) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    if (table.finger(), table.calibrated()) == (finger, calibrated) {
+    let there = (table.finger(), table.calibrated(), table.sensor());
+    if there == (finger, calibrated, sensor) {
         return Ok(bytes.to_vec());
     }
-    let mut named = vec![0; bytes.len() + FINGER_LENGTH];
-    let length = with_finger(&mut named, &table, finger, calibrated)?
+    let mut named = vec![0; bytes.len() + FINGER_LENGTH + sensor.len()];
+    let length = with_finger(&mut named, &table, finger, calibrated, sensor)?
         .as_bytes()
         .len();
     named.truncate(length);

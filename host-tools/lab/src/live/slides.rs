@@ -93,6 +93,6 @@ pub(super) fn table(trials: &[Trials], paper: bool, drift: f32) -> Result<Vec<u8
     let movements = &Collection::MOVEMENTS;
     let lengths_ms = &Collection::LENGTHS_MS;
     let table = learn_lengths(&expected, method, &names, movements, lengths_ms, &slides)?;
-    let named = name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+    let named = name_finger(&table, FingerCode::of(FingerName::Biotac), 0, "");
     named.map_err(|why: EncodeError| why.into())
 }

@@ -192,7 +192,7 @@ impl Collection {
             .map(|cells| cells.iter().map(whole).collect())
             .collect();
         let table = learn::learn(method, features, &self.names(), movements, &slides)?;
-        let named = learn::name_finger(&table, FingerCode::of(finger), 0);
+        let named = learn::name_finger(&table, FingerCode::of(finger), 0, "");
         Ok(named.map_err(TableError::from)?)
     }
 
@@ -211,7 +211,7 @@ impl Collection {
         let usual = Expected::default();
         let (names, movements) = (self.names(), &Self::MOVEMENTS);
         let table = learn::learn_lengths(&usual, method, &names, movements, lengths_ms, &trials)?;
-        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0);
+        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0, "");
         Ok(named.map_err(TableError::from)?)
     }
 

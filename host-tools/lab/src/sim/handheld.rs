@@ -242,7 +242,7 @@ pub fn learn_with(
         }
     }
     let table = learn::learn(Method::Fused, Some(FEATURES), &names, &[MOVEMENT], &known)?;
-    let table = learn::name_finger(&table, FingerCode::of(finger), 0)?;
+    let table = learn::name_finger(&table, FingerCode::of(finger), 0, "")?;
     Ok((table, left_out))
 }
 

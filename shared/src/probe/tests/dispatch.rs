@@ -198,7 +198,14 @@ fn a_stored_table_that_cannot_be_read_is_reported() {
     // nor is one of another finger put in force
     let mut other = vec![0; factory.len() + crate::table::FINGER_LENGTH];
     let table = crate::table::Table::read(&factory).unwrap();
-    crate::table::with_finger(&mut other, &table, FingerCode::of(FingerName::Analog), 0).unwrap();
+    crate::table::with_finger(
+        &mut other,
+        &table,
+        FingerCode::of(FingerName::Analog),
+        0,
+        "",
+    )
+    .unwrap();
     for (stored, told) in [(factory.clone(), 0), (damaged, 1), (other, 1)] {
         let store = block_on(Store::open(Ram::new())).unwrap();
         let mut buffer = vec![0; SECTOR];

@@ -116,7 +116,7 @@ fn the_finger_stays_when_a_table_learns_and_a_table_without_one_is_a_biotacs() {
     for finger in [FingerCode::MEMS, FingerCode(200)] {
         let mut buffers = [[0; 400]; 4];
         let [named, moved, amended, back] = &mut buffers;
-        let named = with_finger(named, &old, finger, 20_261_124).unwrap();
+        let named = with_finger(named, &old, finger, 20_261_124, "").unwrap();
         let moved = with_moved(moved, &named, |_| Some(true)).unwrap();
         let amended = amend(amended, &moved, Change::Forget(0)).unwrap();
         for table in [named, moved, amended] {
@@ -139,7 +139,7 @@ fn the_finger_stays_when_a_table_learns_and_a_table_without_one_is_a_biotacs() {
                 "{why}"
             );
         }
-        let back = with_finger(back, &moved, FingerCode::BIOTAC, 0).unwrap();
+        let back = with_finger(back, &moved, FingerCode::BIOTAC, 0, "").unwrap();
         assert_eq!(
             (back.finger(), back.moved(1)),
             (FingerCode::BIOTAC, Some(true))

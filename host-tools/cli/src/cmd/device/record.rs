@@ -77,6 +77,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         moved: args.sample.said(),
         finger: status.finger,
         calibrated: status.calibrated,
+        ..Labels::default()
     });
     let (probe, mut words) = (bench.probe.clone(), bench.probe.words());
     let mut written = 0;

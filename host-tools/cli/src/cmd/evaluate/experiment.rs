@@ -124,10 +124,10 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
         let (set, measured) = measure_folder(&args.from.folder()?)?;
         let test = args.test.as_deref().map(measure_folder).transpose()?;
         if let Some((test, _)) = &test {
-            let [here, there] = [set.finger()?.0, test.finger()?.0];
+            let [here, there] = [set.sensor()?, test.sensor()?];
             ensure!(
-                here == there,
-                "--test has slides of the finger {there}, and the others are of {here}: they cannot be compared"
+                (here.finger, &here.name) == (there.finger, &there.name),
+                "--test has slides of the sensor {there}, and the others are of {here}: they cannot be compared"
             );
         }
         let test = test.map(|(set, measured)| (set.names(), measured));

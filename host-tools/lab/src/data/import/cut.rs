@@ -30,7 +30,10 @@ pub(super) fn parts(signal: &[f64], length: usize, least: usize) -> Parts {
     sorted.sort_by(f64::total_cmp);
     let quantile = |part: f64| {
         let at = (part * sorted.len() as f64) as usize;
-        sorted.get(at.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
+        sorted
+            .get(at.min(sorted.len().saturating_sub(1)))
+            .copied()
+            .unwrap_or(0.0)
     };
     let (low, high) = (quantile(0.05), quantile(0.9));
     let whole = || stretch(0..signal.len(), length, least);
@@ -52,10 +55,14 @@ pub(super) fn parts(signal: &[f64], length: usize, least: usize) -> Parts {
     }
     let mut still: Option<Range<usize>> = None;
     let mut from = 0;
-    for run in runs.iter().cloned().chain([powers.len()..powers.len()]) {
+    for run in runs.iter().cloned().chain(Some(powers.len()..powers.len())) {
         // what is next to a movement is not still
         let (begin, end) = (from + EDGE.min(from), run.start.saturating_sub(EDGE));
-        if end >= begin + STILL && still.as_ref().is_none_or(|s| s.len() < (end - begin) * FRAME) {
+        if end >= begin + STILL
+            && still
+                .as_ref()
+                .is_none_or(|s| s.len() < (end - begin) * FRAME)
+        {
             still = Some(begin * FRAME..end * FRAME);
         }
         from = run.end;
@@ -76,7 +83,11 @@ fn stretch(run: Range<usize>, length: usize, least: usize) -> Vec<Range<usize>> 
     if samples < least {
         return Vec::new();
     }
-    let pieces = if samples < 2 * length { 1 } else { samples / length };
+    let pieces = if samples < 2 * length {
+        1
+    } else {
+        samples / length
+    };
     let each = if pieces == 1 { samples } else { length };
     (0..pieces)
         .map(|n| run.start + n * each..run.start + (n + 1) * each)
@@ -112,20 +123,33 @@ mod tests {
             }
             signal.extend((0..1500).map(|_| random.random_range(-1.0..1.0)));
             let parts = parts(&signal, 6600, 1100);
-            assert_eq!(parts.slides.len(), truth.len(), "seed {seed}: {parts:?}, {truth:?}");
+            assert_eq!(
+                parts.slides.len(),
+                truth.len(),
+                "seed {seed}: {parts:?}, {truth:?}"
+            );
             for (found, truth) in parts.slides.iter().zip(&truth) {
-                assert!(found.start >= truth.start && found.end <= truth.end, "seed {seed}");
+                assert!(
+                    found.start >= truth.start && found.end <= truth.end,
+                    "seed {seed}"
+                );
                 assert!(found.len() + 6 * FRAME > truth.len(), "seed {seed}");
             }
             let still = parts.still.unwrap();
-            assert!(truth.iter().all(|t| still.end <= t.start || t.end <= still.start));
+            assert!(
+                truth
+                    .iter()
+                    .all(|t| still.end <= t.start || t.end <= still.start)
+            );
         }
     }
 
     #[test]
     fn a_recording_without_a_still_part_is_divided() {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let signal: Vec<f64> = (0..30_000).map(|_| random.random_range(-9.0..9.0)).collect();
+        let signal: Vec<f64> = (0..30_000)
+            .map(|_| random.random_range(-9.0..9.0))
+            .collect();
         let parts = parts(&signal, 6600, 1100);
         assert_eq!(parts.slides.len(), 4);
         assert!(parts.still.is_none());

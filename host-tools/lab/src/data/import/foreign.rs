@@ -24,11 +24,22 @@ const ENDINGS: [&str; 6] = ["wav", "csv", "tsv", "txt", "npy", "dat"];
 /// Largest value that the samples are made to have: 12 bits with a little room.
 const FULL: f64 = 2000.0;
 /// Names of columns of time.
-const TIMES: [&str; 7] = ["time", "t", "timestamp", "seconds", "sec", "elapsed", "zeit"];
+const TIMES: [&str; 7] = [
+    "time",
+    "t",
+    "timestamp",
+    "seconds",
+    "sec",
+    "elapsed",
+    "zeit",
+];
 /// P_AC before the window, so that the filter has filled, in samples.
 const BEFORE: usize = 220;
 /// Longest still part that is kept, in samples.
 const STILL: usize = 2200;
+/// Samples of the slides into which longer sliding is divided: 3 s, and what a slow sensor can have in 20 s.
+const LENGTH: usize = 6600;
+const SLOW_LENGTH: usize = 2000;
 /// Rate of P_DC and of shear in what is written, Hz.
 const SLOW_HZ: u32 = 100;
 /// Width of a picture of a file, in characters.
@@ -84,8 +95,16 @@ impl Survey {
     /// Looks at the files below a folder, or at one file; `progress` is called with the number of files looked at, and
     /// of all.
     /// Errors: something that must be known is neither in the files nor in the settings, or a file is damaged.
-    pub fn of(from: &Path, settings: Settings, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Self> {
-        let folder = if from.is_dir() { from } else { from.parent().unwrap_or(from) };
+    pub fn of(
+        from: &Path,
+        settings: Settings,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Self> {
+        let folder = if from.is_dir() {
+            from
+        } else {
+            from.parent().unwrap_or(from)
+        };
         let settings = settings.with_file(folder)?;
         let paths = files(from, &settings)?;
         let first = Signals::read(&folder.join(&paths[0].0))?;
@@ -108,7 +127,9 @@ impl Survey {
         let peak = found.iter().map(|f| f.peak).fold(0.0, f64::max);
         let pressure = found.iter().map(|f| f.pressure).fold(0.0, f64::max);
         if peak == 0.0 {
-            return Err(at(format!("channel {channel:?} never changes: is the sensor connected?")));
+            return Err(at(format!(
+                "channel {channel:?} never changes: is the sensor connected?"
+            )));
         }
         let gain = match (settings.gain, settings.unit.as_deref()) {
             (Some(gain), _) if gain.is_finite() && gain > 0.0 => gain,
@@ -186,7 +207,11 @@ impl Survey {
             let at = |why: String| RecordingError::at(&path, why);
             let how = How::new(&signals, &self.settings).map_err(at)?;
             for found in parts {
-                let texture = self.textures.iter().position(|t| *t == found.texture).unwrap_or(0);
+                let texture = self
+                    .textures
+                    .iter()
+                    .position(|t| *t == found.texture)
+                    .unwrap_or(0);
                 writer.label(self.labels(found));
                 let pac = how.pac(&signals, &self.channel, found.rows.clone(), self.gain);
                 let slow = |column: &Option<String>, gain: Option<f64>| {
@@ -198,7 +223,8 @@ impl Survey {
                 let shear = slow(&self.settings.shear, Some(1e3))?;
                 for range in &found.ranges.slides {
                     numbers[texture] += 1;
-                    let slide = self.slide(&pac, range, &found.ranges, pdc.as_deref(), shear.as_deref());
+                    let slide =
+                        self.slide(&pac, range, &found.ranges, pdc.as_deref(), shear.as_deref());
                     let slide = slide.map_err(at)?;
                     writer.write(&Recording {
                         texture,
@@ -222,7 +248,11 @@ impl Survey {
             session: found.session.clone(),
             run: found.path.clone(),
             finger: FingerCode::OTHER,
-            sensor: self.settings.finger.clone().unwrap_or_else(|| "my-sensor".to_owned()),
+            sensor: self
+                .settings
+                .finger
+                .clone()
+                .unwrap_or_else(|| "my-sensor".to_owned()),
             ..Labels::default()
         }
     }
@@ -239,9 +269,15 @@ impl Survey {
         let seconds = |samples: usize| samples as f32 / PAC_RATE_HZ as f32;
         let slow = |samples: &[i16]| {
             let at = |sample: usize| sample * SLOW_HZ as usize / PAC_RATE_HZ as usize;
-            samples.get(at(start)..samples.len().min(at(range.end) + 2)).unwrap_or_default().to_vec()
+            samples
+                .get(at(start)..samples.len().min(at(range.end) + 2))
+                .unwrap_or_default()
+                .to_vec()
         };
-        let still = parts.still.clone().map(|still| still.start..still.end.min(still.start + STILL));
+        let still = parts
+            .still
+            .clone()
+            .map(|still| still.start..still.end.min(still.start + STILL));
         let slide = Recording {
             texture: 0,
             number: 0,
@@ -258,9 +294,11 @@ impl Survey {
             outside_mn: None,
             pace: None,
             shear_rate_hz: SLOW_HZ,
-            nyquist_hz: match self.is_stretched() {
+            highest_hz: match self.is_stretched() {
                 true => None,
-                false => (self.rate_hz < f64::from(PAC_RATE_HZ)).then_some(self.rate_hz as f32 / 2.0),
+                false => {
+                    (self.rate_hz < f64::from(PAC_RATE_HZ)).then_some(self.rate_hz as f32 / 2.0)
+                }
             },
         };
         let still = still.map(|still| &pac[still]).unwrap_or_default();
@@ -278,10 +316,19 @@ struct How {
 
 impl How {
     fn new(signals: &Signals, settings: &Settings) -> std::result::Result<Self, String> {
-        let timed = time(signals, settings)?.map(|(_, times)| rate_of(&times)).transpose()?;
-        let rate = settings.rate.or(signals.rate_hz).or(timed.map(|(rate, _)| rate));
+        let timed = time(signals, settings)?
+            .map(|(_, times)| rate_of(&times))
+            .transpose()?;
+        let rate = settings
+            .rate
+            .or(signals.rate_hz)
+            .or(timed.map(|(rate, _)| rate));
         let Some(rate_hz) = rate else {
-            let columns: Vec<&str> = signals.channels.iter().map(|(name, _)| name.as_str()).collect();
+            let columns: Vec<&str> = signals
+                .channels
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .collect();
             return Err(format!(
                 "no rate: give --rate HZ, or --time COLUMN; the columns of numbers are {}",
                 columns.join(", ")
@@ -293,7 +340,9 @@ impl How {
                 RATES_HZ.end()
             ));
         }
-        let from_hz = RATES_HZ.contains(&rate_hz).then_some(rate_hz.round() as u32);
+        let from_hz = RATES_HZ
+            .contains(&rate_hz)
+            .then_some(rate_hz.round() as u32);
         Ok(Self { rate_hz, from_hz })
     }
 
@@ -314,14 +363,21 @@ impl How {
             ));
         }
         let (_, all) = signals.channel(channel).ok_or_else(|| {
-            let names: Vec<&str> = signals.channels.iter().map(|(name, _)| name.as_str()).collect();
+            let names: Vec<&str> = signals
+                .channels
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .collect();
             format!("no channel {channel:?}; there are {}", names.join(", "))
         })?;
         let gaps = match time(signals, settings)? {
             Some((_, times)) => rate_of(&times)?.1,
             None => Vec::new(),
         };
-        let column = settings.texture.as_ref().filter(|t| !t.contains(['{', '*']));
+        let column = settings
+            .texture
+            .as_ref()
+            .filter(|t| !t.contains(['{', '*']));
         let words = match column {
             None => None,
             Some(column) => {
@@ -340,8 +396,11 @@ impl How {
                 runs.filter(|(word, _)| !word.is_empty()).collect()
             }
         };
-        let length = settings.length.unwrap_or(3.0 * self.stretch());
-        let length = (length * self.out_hz()) as usize;
+        let length = match (settings.length, self.from_hz) {
+            (Some(seconds), _) => (seconds * self.out_hz()) as usize,
+            (None, Some(_)) => LENGTH,
+            (None, None) => SLOW_LENGTH,
+        };
         let window = settings.window()?;
         let found = stretches.into_iter().map(|(texture, rows)| {
             let out = self.resampled(&all[rows.clone()]);
@@ -349,7 +408,10 @@ impl How {
                 Some((from, to)) => {
                     let at = |s: f64| ((s * self.out_hz()) as usize).min(out.len());
                     let still = (at(from) >= STILL / 2).then_some(0..at(from));
-                    Parts { slides: vec![at(from)..at(to)], still }
+                    Parts {
+                        slides: Vec::from_iter(Some(at(from)..at(to))),
+                        still,
+                    }
                 }
                 None => parts(&out, length.max(1), LEAST),
             };
@@ -357,26 +419,42 @@ impl How {
             let there = ranges.slides.len();
             let scale = out.len() as f64 / rows.len() as f64;
             let whole = |range: &Range<usize>| {
-                !gaps.iter().filter_map(|gap| gap.checked_sub(rows.start)).any(|gap| {
-                    range.contains(&((gap as f64 * scale) as usize))
-                })
+                !gaps
+                    .iter()
+                    .filter_map(|gap| gap.checked_sub(rows.start))
+                    .any(|gap| range.contains(&((gap as f64 * scale) as usize)))
             };
             ranges.slides.retain(whole);
             let peak = out.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             let pressure = settings.pressure.as_ref().map(|column| {
-                let (_, values) = signals.channel(column).ok_or_else(|| format!("no column {column:?}"))?;
+                let (_, values) = signals
+                    .channel(column)
+                    .ok_or_else(|| format!("no column {column:?}"))?;
                 let values = &values[rows.clone()];
-                let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
-                Ok::<_, String>(if high > low { low.abs().max(high.abs()) } else { 0.0 })
+                let (low, high) = values
+                    .iter()
+                    .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+                Ok::<_, String>(if high > low {
+                    low.abs().max(high.abs())
+                } else {
+                    0.0
+                })
             });
             let part = |at: usize| at as f32 / out.len() as f32;
             Ok(Found {
                 path: path.to_owned(),
                 texture,
-                session: settings.session.clone().unwrap_or_else(|| named.session.clone()),
+                session: settings
+                    .session
+                    .clone()
+                    .unwrap_or_else(|| named.session.clone()),
                 seconds: rows.len() as f64 / self.rate_hz,
                 envelope: envelope(&out),
-                slides: ranges.slides.iter().map(|r| (part(r.start), part(r.end))).collect(),
+                slides: ranges
+                    .slides
+                    .iter()
+                    .map(|r| (part(r.start), part(r.end)))
+                    .collect(),
                 gaps: there - ranges.slides.len(),
                 still: ranges.still.is_some(),
                 rows,
@@ -426,7 +504,9 @@ impl How {
         found: &Found,
         gain: f64,
     ) -> std::result::Result<Vec<i16>, String> {
-        let (_, all) = signals.channel(column).ok_or_else(|| format!("no column {column:?}"))?;
+        let (_, all) = signals
+            .channel(column)
+            .ok_or_else(|| format!("no column {column:?}"))?;
         let values = all.get(found.rows.clone()).unwrap_or_default();
         let each = self.rate_hz * self.stretch() / f64::from(SLOW_HZ);
         let samples = (values.len() as f64 / each).ceil() as usize;
@@ -435,7 +515,9 @@ impl How {
             let some = &values[at(n)..at(n + 1).max(at(n) + 1)];
             some.iter().sum::<f64>() / some.len() as f64
         };
-        Ok((0..samples).map(|n| (mean(n) * gain).round() as i16).collect())
+        Ok((0..samples)
+            .map(|n| (mean(n) * gain).round() as i16)
+            .collect())
     }
 }
 
@@ -443,19 +525,30 @@ impl How {
 const LEAST: usize = 1100;
 
 /// The file's column of time, in s.
-fn time(signals: &Signals, settings: &Settings) -> std::result::Result<Option<(String, Vec<f64>)>, String> {
+fn time(
+    signals: &Signals,
+    settings: &Settings,
+) -> std::result::Result<Option<(String, Vec<f64>)>, String> {
     let is_time = |name: &str| {
         let name = name.to_lowercase();
         let word = name.split(['_', ' ', '(', '[']).next().unwrap_or_default();
         TIMES.contains(&word)
     };
     let column = match &settings.time {
-        Some(time) => Some(signals.channel(time).ok_or_else(|| format!("no column {time:?}"))?),
+        Some(time) => Some(
+            signals
+                .channel(time)
+                .ok_or_else(|| format!("no column {time:?}"))?,
+        ),
         None => signals.channels.iter().find(|(name, _)| is_time(name)),
     };
     Ok(column.map(|(name, values)| {
         let lower = name.to_lowercase();
-        let has = |unit: &str| lower.split(|c: char| !c.is_alphanumeric()).any(|part| part == unit);
+        let has = |unit: &str| {
+            lower
+                .split(|c: char| !c.is_alphanumeric())
+                .any(|part| part == unit)
+        };
         let unit = match () {
             () if has("ns") => 1e-9,
             () if has("us") || has("µs") => 1e-6,
@@ -476,9 +569,16 @@ fn rate_of(times: &[f64]) -> std::result::Result<(f64, Vec<usize>), String> {
         return Err("its time does not go on; give --rate HZ instead".to_owned());
     }
     // samples that came in bursts have the right mean, and the median of a clock that jumps is not moved by it
-    let usual: Vec<f64> = gaps.iter().copied().filter(|s| (0.0..3.0 * middle).contains(s)).collect();
+    let usual: Vec<f64> = gaps
+        .iter()
+        .copied()
+        .filter(|s| (0.0..3.0 * middle).contains(s))
+        .collect();
     let mean = usual.iter().sum::<f64>() / usual.len() as f64;
-    let jumps = gaps.iter().enumerate().filter(|(_, s)| !(0.0..=3.0 * middle).contains(*s));
+    let jumps = gaps
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| !(0.0..=3.0 * middle).contains(*s));
     Ok((1.0 / mean, jumps.map(|(at, _)| at + 1).collect()))
 }
 
@@ -486,8 +586,16 @@ fn rate_of(times: &[f64]) -> std::result::Result<(f64, Vec<usize>), String> {
 fn liveliest(signals: &Signals, settings: &Settings) -> std::result::Result<String, String> {
     let time = time(signals, settings)?.map(|(name, _)| name);
     let slow = [&time, &settings.pressure, &settings.shear];
-    let others = signals.channels.iter().filter(|(name, _)| !slow.contains(&&Some(name.clone())));
-    let energy = |samples: &[f64]| samples.windows(2).map(|p| (p[1] - p[0]).powi(2)).sum::<f64>();
+    let others = signals
+        .channels
+        .iter()
+        .filter(|(name, _)| !slow.contains(&&Some(name.clone())));
+    let energy = |samples: &[f64]| {
+        samples
+            .windows(2)
+            .map(|p| (p[1] - p[0]).powi(2))
+            .sum::<f64>()
+    };
     let best = others.max_by(|(_, a), (_, b)| energy(a).total_cmp(&energy(b)));
     best.map(|(name, _)| name.clone())
         .ok_or_else(|| "no column of numbers beside the time".to_owned())
@@ -506,7 +614,10 @@ fn envelope(out: &[f64]) -> Vec<f32> {
         .map(|part| (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).sqrt())
         .collect();
     let most = powers.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    powers.into_iter().map(|power| (power / most) as f32).collect()
+    powers
+        .into_iter()
+        .map(|power| (power / most) as f32)
+        .collect()
 }
 
 /// The files to import, by their paths below the folder, and what these say, in their natural order.
@@ -515,11 +626,16 @@ fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Named)>> {
     if from.is_dir() {
         walk(from, "", 0, &mut paths)?;
     } else {
-        let name = from.file_name().map(|name| name.to_string_lossy().into_owned());
+        let name = from
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
         paths.extend(name);
     }
     paths.sort_by_cached_key(|path| natural(path));
-    let pattern = settings.texture.as_ref().filter(|texture| texture.contains(['{', '*']));
+    let pattern = settings
+        .texture
+        .as_ref()
+        .filter(|texture| texture.contains(['{', '*']));
     let named = paths.into_iter().filter_map(|path| {
         let named = match pattern {
             Some(pattern) => matched(pattern, &path)?,
@@ -553,12 +669,18 @@ fn walk(folder: &Path, below: &str, depth: usize, paths: &mut Vec<String>) -> Re
             walk(&entry.path(), &format!("{path}/"), depth + 1, paths)?;
         } else if kind.is_file() {
             let plain = name.strip_suffix(".gz").unwrap_or(&name).to_lowercase();
-            if plain.rsplit_once('.').is_some_and(|(_, end)| ENDINGS.contains(&end)) {
+            if plain
+                .rsplit_once('.')
+                .is_some_and(|(_, end)| ENDINGS.contains(&end))
+            {
                 paths.push(path);
             }
         }
         if paths.len() > MOST_FILES {
-            return Err(RecordingError::at(folder, format!("more than {MOST_FILES} files; import a part")));
+            return Err(RecordingError::at(
+                folder,
+                format!("more than {MOST_FILES} files; import a part"),
+            ));
         }
     }
     Ok(())
@@ -569,9 +691,13 @@ fn natural(path: &str) -> Vec<(String, u64)> {
     let mut key = Vec::new();
     let mut rest = path;
     while !rest.is_empty() {
-        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let digits = rest
+            .find(|c: char| c.is_ascii_digit())
+            .unwrap_or(rest.len());
         let (word, after) = rest.split_at(digits);
-        let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+        let end = after
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(after.len());
         let (number, after) = after.split_at(end);
         key.push((word.to_owned(), number.parse().unwrap_or(u64::MAX)));
         rest = after;

@@ -60,20 +60,52 @@ pub struct Settings {
 }
 
 const HELP: [(&str, &str, &str); 14] = [
-    ("rate", "1000.0", "samples per second, where the files have no time"),
-    ("time", "\"time_s\"", "column of the time in s (ms or us if its name says so)"),
-    ("channel", "\"z\"", "column or channel of the vibration, by name or number"),
+    (
+        "rate",
+        "1000.0",
+        "samples per second, where the files have no time",
+    ),
+    (
+        "time",
+        "\"time_s\"",
+        "column of the time in s (ms or us if its name says so)",
+    ),
+    (
+        "channel",
+        "\"z\"",
+        "column or channel of the vibration, by name or number",
+    ),
     ("unit", "\"m/s2\"", "counts, g, m/s2, V, Pa, N"),
     ("gain", "100.0", "counts per unit"),
-    ("pressure", "\"force_n\"", "column of the contact's pressure (P_DC)"),
-    ("shear", "\"fx_n\"", "column of the tangential force against the motion, N"),
-    ("texture", "\"{session}/{texture}_*.csv\"", "a column of words, or a pattern of paths"),
+    (
+        "pressure",
+        "\"force_n\"",
+        "column of the contact's pressure (P_DC)",
+    ),
+    (
+        "shear",
+        "\"fx_n\"",
+        "column of the tangential force against the motion, N",
+    ),
+    (
+        "texture",
+        "\"{session}/{texture}_*.csv\"",
+        "a column of words, or a pattern of paths",
+    ),
     ("session", "\"monday\"", "session of all files"),
     ("finger", "\"my-sensor\"", "name of the sensor"),
     ("force", "0.5", "contact force, N"),
     ("speed", "25.0", "sliding speed, mm/s"),
-    ("window", "\"0.5,3\"", "sliding from and to, s from the start of each file"),
-    ("length", "3.0", "length of the slides into which longer sliding is divided, s"),
+    (
+        "window",
+        "\"0.5,3\"",
+        "sliding from and to, s from the start of each file",
+    ),
+    (
+        "length",
+        "3.0",
+        "length of the slides into which longer sliding is divided, s",
+    ),
 ];
 
 impl Settings {
@@ -87,8 +119,12 @@ impl Settings {
         let bytes = read_bounded(&path, MAX_SETTINGS)?;
         let text = String::from_utf8(bytes).map_err(|why| RecordingError::at(&path, why))?;
         let file: Self = toml::from_str(&text).map_err(|why| {
-            let place = why.span().map(|span| text[..span.start].lines().count().max(1));
-            let place = place.map(|line| format!("line {line}: ")).unwrap_or_default();
+            let place = why
+                .span()
+                .map(|span| text[..span.start].matches('\n').count() + 1);
+            let place = place
+                .map(|line| format!("line {line}: "))
+                .unwrap_or_default();
             RecordingError::at(&path, format!("{place}{}", why.message()))
         })?;
         Ok(Self {
@@ -112,10 +148,12 @@ impl Settings {
     /// The file of these settings: each with a line that says what it is, those that are open as comments.
     pub fn template(&self) -> String {
         let given = toml::Table::try_from(self).unwrap_or_default();
-        let lines = HELP.iter().map(|(key, example, what)| match given.get(*key) {
-            Some(value) => format!("# {what}\n{key} = {value}\n"),
-            None => format!("# {what}\n# {key} = {example}\n"),
-        });
+        let lines = HELP
+            .iter()
+            .map(|(key, example, what)| match given.get(*key) {
+                Some(value) => format!("# {what}\n{key} = {value}\n"),
+                None => format!("# {what}\n# {key} = {example}\n"),
+            });
         let head = "# What the files of this folder do not say, for `tactus import`.\n\n";
         head.to_owned() + &lines.collect::<String>()
     }
@@ -147,8 +185,9 @@ pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
     fn go(pattern: &str, path: &str, mut named: Named) -> Option<Named> {
         let (field, rest) = if let Some(rest) = pattern.strip_prefix('*') {
             ("", rest)
-        } else if let Some((field, rest)) =
-            pattern.strip_prefix('{').and_then(|rest| rest.split_once('}'))
+        } else if let Some((field, rest)) = pattern
+            .strip_prefix('{')
+            .and_then(|rest| rest.split_once('}'))
         {
             (field, rest)
         } else {
@@ -190,9 +229,14 @@ pub(super) fn guessed(path: &str) -> Named {
     let is_session = |name: &&str| {
         let letters = name.trim_end_matches(|c: char| c.is_ascii_digit() || "-_ .".contains(c));
         let words = ["", "day", "session", "sess", "s", "run", "r", "d"];
-        name.ends_with(|c: char| c.is_ascii_digit()) && words.contains(&letters.to_lowercase().as_str())
+        name.ends_with(|c: char| c.is_ascii_digit())
+            && words.contains(&letters.to_lowercase().as_str())
     };
-    let session = folders.iter().copied().find(|f| is_session(f)).unwrap_or_default();
+    let session = folders
+        .iter()
+        .copied()
+        .find(|f| is_session(f))
+        .unwrap_or_default();
     let texture = folders.iter().rev().copied().find(|f| !is_session(f));
     let stem = || {
         let stem = file.strip_suffix(".gz").unwrap_or(file);
@@ -221,10 +265,16 @@ mod tests {
             ("007.csv", "007", ""),
         ] {
             let named = guessed(path);
-            assert_eq!((named.texture.as_str(), named.session.as_str()), (texture, session));
+            assert_eq!(
+                (named.texture.as_str(), named.session.as_str()),
+                (texture, session)
+            );
         }
         let named = matched("{session}/*_{texture}-*.wav", "monday/x_silk-03.wav").unwrap();
-        assert_eq!((named.texture.as_str(), named.session.as_str()), ("silk", "monday"));
+        assert_eq!(
+            (named.texture.as_str(), named.session.as_str()),
+            ("silk", "monday")
+        );
         assert_eq!(matched("{texture}/*.wav", "a/b/c.wav"), None);
         assert_eq!(matched("{texture}*.csv", "é1.csv").unwrap().texture, "é");
     }
@@ -243,7 +293,10 @@ mod tests {
         let all = Settings::default().template().replace("# r", "r");
         assert!(all.contains("\nrate = 1000.0"));
         std::fs::write(folder.path().join(SETTINGS), "rate = 1\nrat = 2").unwrap();
-        let why = Settings::default().with_file(folder.path()).unwrap_err().to_string();
+        let why = Settings::default()
+            .with_file(folder.path())
+            .unwrap_err()
+            .to_string();
         assert!(why.contains("line 2") && why.contains("rat"), "{why}");
     }
 }

@@ -38,10 +38,15 @@ impl Signals {
     pub fn of(bytes: &[u8]) -> std::result::Result<Self, String> {
         let mut plain = Vec::new();
         let bytes = if bytes.starts_with(b"\x1f\x8b") {
-            let unpacked = GzDecoder::new(bytes).take(MAX_BYTES + 1).read_to_end(&mut plain);
+            let unpacked = GzDecoder::new(bytes)
+                .take(MAX_BYTES + 1)
+                .read_to_end(&mut plain);
             unpacked.map_err(|why| format!("no whole gzip file ({why}); fetch it again"))?;
             if plain.len() as u64 > MAX_BYTES {
-                return Err(format!("unpacks to more than {} MB; split it", MAX_BYTES >> 20));
+                return Err(format!(
+                    "unpacks to more than {} MB; split it",
+                    MAX_BYTES >> 20
+                ));
             }
             &plain
         } else {
@@ -76,7 +81,9 @@ fn wav(bytes: &[u8]) -> std::result::Result<Signals, String> {
         hound::SampleFormat::Float => reader.samples::<f32>().map(|s| s.map(f64::from)).collect(),
         hound::SampleFormat::Int => {
             let samples = reader.samples::<i32>();
-            samples.map(|s| s.map(|s| f64::from(s) / full_scale)).collect()
+            samples
+                .map(|s| s.map(|s| f64::from(s) / full_scale))
+                .collect()
         }
     };
     let all = all.map_err(fault)?;
@@ -85,7 +92,9 @@ fn wav(bytes: &[u8]) -> std::result::Result<Signals, String> {
     finite(&all)?;
     Ok(Signals {
         rate_hz: Some(f64::from(spec.sample_rate)),
-        channels: (0..channels).map(|c| ((c + 1).to_string(), channel(c))).collect(),
+        channels: (0..channels)
+            .map(|c| ((c + 1).to_string(), channel(c)))
+            .collect(),
         words: Vec::new(),
         kind: "WAV",
     })
@@ -99,13 +108,23 @@ fn array(bytes: &[u8]) -> std::result::Result<Signals, String> {
         // a recording is longer than it has channels
         [one, other] if one >= other => (one, other, true),
         [one, other] => (other, one, false),
-        _ => return Err(format!("an array of {} dimensions; save one or two", shape.len())),
+        _ => {
+            return Err(format!(
+                "an array of {} dimensions; save one or two",
+                shape.len()
+            ));
+        }
     };
     let at = |sample: usize, channel: usize| match by_row {
         true => data[sample * channels + channel],
         false => data[channel * samples + sample],
     };
-    let channel = |c| ((c + 1).to_string(), (0..samples).map(|s| at(s, c)).collect());
+    let channel = |c: usize| {
+        (
+            (c + 1).to_string(),
+            (0..samples).map(|s| at(s, c)).collect(),
+        )
+    };
     if channels > MAX_COLUMNS {
         return Err(format!("{channels} channels are more than {MAX_COLUMNS}"));
     }
@@ -140,7 +159,12 @@ fn table(bytes: &[u8]) -> std::result::Result<Signals, String> {
     let is_row = |line: &&str| !line.is_empty() && !line.starts_with(['#', '%']);
     let mut rows = text.lines().map(str::trim).filter(is_row).peekable();
     let first = *rows.peek().ok_or("an empty file")?;
-    let second = text.lines().map(str::trim).filter(is_row).nth(1).unwrap_or(first);
+    let second = text
+        .lines()
+        .map(str::trim)
+        .filter(is_row)
+        .nth(1)
+        .unwrap_or(first);
     let mark = *MARKS
         .iter()
         .find(|mark| second.as_bytes().contains(mark))
@@ -172,10 +196,16 @@ fn table(bytes: &[u8]) -> std::result::Result<Signals, String> {
         if record.iter().all(str::is_empty) || record.get(0).is_some_and(is_comment) {
             continue;
         }
-        let fields: Vec<&str> = record.iter().filter(|f| mark != b' ' || !f.is_empty()).collect();
+        let fields: Vec<&str> = record
+            .iter()
+            .filter(|f| mark != b' ' || !f.is_empty())
+            .collect();
         if names.is_empty() {
             if fields.len() > MAX_COLUMNS {
-                return Err(format!("{} columns are more than {MAX_COLUMNS}", fields.len()));
+                return Err(format!(
+                    "{} columns are more than {MAX_COLUMNS}",
+                    fields.len()
+                ));
             }
             columns = vec![Vec::new(); fields.len()];
             let is_header = fields.iter().all(|f| number(f).is_none());
@@ -218,12 +248,16 @@ fn columns_of(
     let mut twice = HashMap::new();
     for (name, column) in names.into_iter().zip(columns) {
         if twice.insert(name.clone(), ()).is_some() {
-            return Err(format!("two columns are called {name:?}; give each a name of its own"));
+            return Err(format!(
+                "two columns are called {name:?}; give each a name of its own"
+            ));
         }
         let numbers = column.iter().filter(|(value, _)| value.is_some()).count();
         // a column with some words among its numbers is damaged, not a column of words
         if numbers * 2 > column.len() {
-            let wrong = column.iter().position(|(value, _)| !value.is_some_and(f64::is_finite));
+            let wrong = column
+                .iter()
+                .position(|(value, _)| !value.is_some_and(f64::is_finite));
             if let Some(row) = wrong {
                 let (value, word) = &column[row];
                 let word = value.map_or_else(|| word.clone(), |value| value.to_string());

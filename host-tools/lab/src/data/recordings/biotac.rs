@@ -209,6 +209,7 @@ impl Manifest {
                     outside_mn: None,
                     pace: None,
                     shear_rate_hz: shear.unwrap_or(pdc).rate_hz,
+                    highest_hz: None,
                 };
                 let slide = slide.cut(&[], field(pac), shear.map(field));
                 slide.map_err(|cause| {

@@ -8,8 +8,8 @@ use std::path::{Component, Path, PathBuf};
 
 use flate2::read::GzDecoder;
 use sha2::{Digest as _, Sha256};
-use tactus_core::sensor::FingerCode;
 
+use super::Sensor;
 use crate::data::recording::Texture;
 
 /// Name of the manifest of the project's own format.
@@ -55,9 +55,9 @@ impl RecordingError {
         Self(sentence)
     }
 
-    pub(super) fn two_fingers(one: FingerCode, other: FingerCode) -> Self {
+    pub(super) fn two_fingers(one: &Sensor, other: &Sensor) -> Self {
         Self(format!(
-            "slides of two fingers, {one} and {other}, cannot be compared: keep them in folders of their own"
+            "slides of two sensors, {one} and {other}, cannot be compared: keep them in folders of their own"
         ))
     }
 }

@@ -31,62 +31,163 @@ pub fn array(kind: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
 /// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write()`] make
 /// them.
 ///
-/// The header is compared with the one form it can have. npyz would parse it as a Python literal of any depth and size,
-/// which a damaged file can turn against us.
 pub fn read(bytes: &[u8]) -> Result<Vec<i16>, String> {
-    let rest = bytes
-        .strip_prefix(b"\x93NUMPY")
-        .ok_or_else(|| format!("not a .npy file{FIX}"))?;
-    let cut = "the .npy file ends within its header; fetch or record it again";
-    let (version, rest) = rest.split_at_checked(2).ok_or(cut)?;
-    let size_bytes = match version {
-        [1, 0] => 2,
-        [2 | 3, 0] => 4,
-        _ => {
-            let [major, minor] = [version[0], version[1]];
-            return Err(format!(
-                "version {major}.{minor} of the .npy format is unknown{FIX}"
-            ));
-        }
-    };
-    let (size, rest) = rest.split_at_checked(size_bytes).ok_or(cut)?;
-    // little-endian
-    let size = size.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b));
-    let (header, data) = rest.split_at_checked(size).ok_or(cut)?;
-    let header: String = header
-        .iter()
-        .filter(|b| !b.is_ascii_whitespace())
-        .map(|b| char::from(*b))
-        .collect();
-
+    let Header {
+        kind,
+        fortran,
+        shape,
+        data,
+        text,
+    } = Header::of(bytes)?;
     let wrong = |what| {
-        let header: String = header.chars().take(120).collect();
-        format!("{what} in the .npy header {header}{FIX}")
+        let text: String = text.chars().take(120).collect();
+        format!("{what} in the .npy header {text}{FIX}")
     };
-    let rest = header
-        .strip_prefix("{'descr':'<i2',")
-        .ok_or_else(|| wrong("the type is not '<i2'"))?;
-    let rest = rest
-        .strip_prefix("'fortran_order':False,")
-        .ok_or_else(|| wrong("the order is not C"))?;
-    let shape = rest
-        .strip_prefix("'shape':(")
-        .and_then(|rest| rest.trim_end_matches([',', '}']).strip_suffix(",)"))
-        .and_then(|number| number.parse::<u64>().ok())
-        .ok_or_else(|| wrong("the shape is not one number"))?;
+    if kind != "<i2" {
+        return Err(wrong("the type is not '<i2'"));
+    }
+    if fortran {
+        return Err(wrong("the order is not C"));
+    }
+    let [samples] = shape[..] else {
+        return Err(wrong("the shape is not one number"));
+    };
     if !data.len().is_multiple_of(2) {
         return Err(format!(
             "{} bytes of samples are an odd number, and a sample has two; fetch or record the file again",
             data.len()
         ));
     }
-    if shape != data.len() as u64 / 2 {
+    if samples != data.len() / 2 {
         return Err(format!(
-            "samples by the .npy header: {shape}; in the file: {}; fetch or record it again",
+            "samples by the .npy header: {samples}; in the file: {}; fetch or record it again",
             data.len() / 2
         ));
     }
     Ok(from_le_bytes(data))
+}
+
+/// The parts of a `.npy` file.
+///
+/// The header is compared with the one form that numpy gives it. npyz would parse it as a Python literal of any depth
+/// and size, which a damaged file can turn against us.
+struct Header<'b> {
+    kind: String,
+    fortran: bool,
+    shape: Vec<usize>,
+    data: &'b [u8],
+    text: String,
+}
+
+impl<'b> Header<'b> {
+    fn of(bytes: &'b [u8]) -> Result<Self, String> {
+        let rest = bytes
+            .strip_prefix(b"\x93NUMPY")
+            .ok_or_else(|| format!("not a .npy file{FIX}"))?;
+        let cut = "the .npy file ends within its header; fetch or record it again";
+        let (version, rest) = rest.split_at_checked(2).ok_or(cut)?;
+        let size_bytes = match version {
+            [1, 0] => 2,
+            [2 | 3, 0] => 4,
+            _ => {
+                let [major, minor] = [version[0], version[1]];
+                return Err(format!(
+                    "version {major}.{minor} of the .npy format is unknown{FIX}"
+                ));
+            }
+        };
+        let (size, rest) = rest.split_at_checked(size_bytes).ok_or(cut)?;
+        // little-endian
+        let size = size.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b));
+        let (text, data) = rest.split_at_checked(size).ok_or(cut)?;
+        let text: String = text
+            .iter()
+            .filter(|b| !b.is_ascii_whitespace())
+            .map(|b| char::from(*b))
+            .collect();
+        let parse = || {
+            let rest = text.strip_prefix("{'descr':'")?;
+            let (kind, rest) = rest.split_once("','fortran_order':")?;
+            let (fortran, rest) = rest.split_once(",'shape':(")?;
+            let (shape, _) = rest.split_once(')')?;
+            let shape = shape.split(',').filter(|length| !length.is_empty());
+            let shape = shape
+                .map(|length| length.parse().ok())
+                .collect::<Option<_>>()?;
+            Some((kind.to_owned(), fortran == "True", shape))
+        };
+        let wrong = || {
+            let text: String = text.chars().take(120).collect();
+            format!("the .npy header is {text}{FIX}")
+        };
+        let (kind, fortran, shape) = parse().ok_or_else(wrong)?;
+        Ok(Self {
+            kind,
+            fortran,
+            shape,
+            data,
+            text,
+        })
+    }
+}
+
+/// An array of numbers of any kind.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Array {
+    /// Its shape.
+    pub shape: Vec<usize>,
+    /// Its elements in C's order.
+    pub data: Vec<f64>,
+}
+
+/// The array of a `.npy` file of integers or floats, of either byte order.
+/// Errors: It is none.
+pub fn read_any(bytes: &[u8]) -> Result<Array, String> {
+    let header = Header::of(bytes)?;
+    let data = header.data;
+    let big = header.kind.starts_with('>');
+    macro_rules! elements {
+        ($number:ty) => {{
+            let (elements, rest) = data.as_chunks::<{ size_of::<$number>() }>();
+            let number = |bytes: &[u8; size_of::<$number>()]| match big {
+                true => <$number>::from_be_bytes(*bytes) as f64,
+                false => <$number>::from_le_bytes(*bytes) as f64,
+            };
+            let all: Vec<f64> = elements.iter().map(number).collect();
+            rest.is_empty().then_some(all)
+        }};
+    }
+    let all = match header.kind.trim_start_matches(['<', '>', '|', '=']) {
+        "i1" => elements!(i8),
+        "u1" => elements!(u8),
+        "i2" => elements!(i16),
+        "u2" => elements!(u16),
+        "i4" => elements!(i32),
+        "u4" => elements!(u32),
+        "i8" => elements!(i64),
+        "u8" => elements!(u64),
+        "f4" => elements!(f32),
+        "f8" => elements!(f64),
+        kind => {
+            return Err(format!(
+                "an array of {kind:?}; save one of integers or floats"
+            ));
+        }
+    };
+    let wanted = header
+        .shape
+        .iter()
+        .try_fold(1_usize, |n, length| n.checked_mul(*length));
+    let all = all.filter(|all| Some(all.len()) == wanted);
+    let mut data = all.ok_or("its header says another number of elements; save it again")?;
+    if let (true, &[rows, columns]) = (header.fortran, &header.shape[..]) {
+        let by_row = (0..rows * columns).map(|n| data[n % columns * rows + n / columns]);
+        data = by_row.collect();
+    }
+    Ok(Array {
+        shape: header.shape,
+        data,
+    })
 }
 
 /// Samples from pairs of bytes, the low one first.

@@ -6,27 +6,30 @@
 //! | `texture` | number of the texture; the same number always has the same name |
 //! | `name` | name of the texture, without spaces around it |
 //! | `slide` | number of the slide; slides of a texture are numbered in the order of time, each number once |
-//! | `force_n`, `speed_mm_s` | the movement: contact force in N, sliding speed in mm/s |
+//! | `force_n`, `speed_mm_s` | the movement: contact force in N, sliding speed in mm/s; both empty if unknown |
 //! | `window_start_s`, `window_end_s` | the steady part, in s from the start of the record |
-//! | `background_power` | power of P_AC without texture after the band-pass, in counts^2; empty if there is a file |
-//! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; empty if there is a power |
+//! | `background_power` | power of P_AC without texture after the band-pass, in counts^2 |
+//! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; both empty if not measured |
 //! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
-//! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline |
+//! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline; empty if not measured |
 //! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force against the motion, mN; empty if not measured |
 //! | `lot`, `operator`, `note` | batch or piece, operator, remark; may be empty or missing |
 //! | `moved` | sample moved or turned since the slide before: `yes`, `no`, or empty or missing if unknown |
-//! | `finger` | the finger: `biotac`, `analog` or `mems`; empty or missing for a BioTac |
+//! | `session`, `run` | session, and run of the machine in it; may be empty or missing |
+//! | `finger` | the finger: `biotac`, `analog`, `mems`, or the name of another sensor; empty or missing for a BioTac |
+//! | `highest_hz` | highest frequency that the sensor measures, Hz; empty or missing for 1100 |
 //! | `calibrated` | day of the force calibration, as 20261121; 1: day unknown; empty, 0 or missing: none, or unknown |
 //! | `pace` | ln(mean speed / `speed_mm_s`) in 1/1024, by a sensor of motion; empty or missing if not measured |
 //! | `version` | version of this format, 1; empty or missing for 1 |
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is
-//! a one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal. The rows
-//! may come in any order; textures are taken in the order of their first row.
+//! a one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal; it may
+//! be empty. The rows may come in any order; textures are taken in the order of their first row.
 use std::path::Path;
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
+use tactus_core::table::valid_name;
 
 use super::files::{
     OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
@@ -59,11 +62,14 @@ pub const COLUMNS: [&str; 19] = [
     "shear_sha256",
 ];
 
+/// Rate of P_DC and shear, Hz, where a row does not say.
+const SLOW_HZ: u32 = 100;
+
 /// Version of the format.
 pub const VERSION: u32 = 1;
 
 /// Columns that follow them, and may be missing: not everybody measures, or notes, what they hold.
-pub(crate) const LABELS: [&str; 8] = [
+pub(crate) const LABELS: [&str; 11] = [
     "lot",
     "operator",
     "note",
@@ -72,6 +78,9 @@ pub(crate) const LABELS: [&str; 8] = [
     "calibrated",
     "pace",
     "version",
+    "session",
+    "run",
+    "highest_hz",
 ];
 
 /// The contents of a manifest, checked.
@@ -89,11 +98,12 @@ struct Entry {
     window: (f32, f32),
     background: Background,
     pac: Stream,
-    pdc: Stream,
+    pdc: Option<Stream>,
     pdc_rate_hz: u32,
     shear: Option<Stream>,
     shear_rate_hz: u32,
     pace: Option<i16>,
+    highest_hz: Option<f32>,
 }
 
 #[derive(Debug)]
@@ -105,6 +115,7 @@ enum Background {
 #[derive(Debug)]
 struct Stream {
     file: String,
+    /// empty: it is not checked
     sha256: String,
 }
 
@@ -177,9 +188,15 @@ impl Entry {
                 return Err(row.error(Some("version"), cause));
             }
         }
-        let rate = |column| row.parse(column, "a rate in whole Hz");
-        let movement = Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
-            .map_err(|e| row.error(None, e.to_string()))?;
+        let rate = |column| match row.text(column) {
+            "" => Ok(SLOW_HZ),
+            _ => row.parse(column, "a rate in whole Hz"),
+        };
+        let movement = match (row.text("force_n"), row.text("speed_mm_s")) {
+            ("", "") => Movement::UNKNOWN,
+            _ => Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
+                .map_err(|e| row.error(None, e.to_string()))?,
+        };
         let pac_rate_hz: u32 = rate("pac_rate_hz")?;
         if pac_rate_hz != PAC_RATE_HZ {
             let cause = format!("{pac_rate_hz} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz");
@@ -188,17 +205,34 @@ impl Entry {
         let still = Stream::of(row, "background_file", "background_sha256")?;
         let background = match (row.text("background_power"), still) {
             ("", Some(still)) => Background::Still(still),
+            ("", None) => Background::Power(0.0),
             (_, None) => Background::Power(row.number("background_power")?),
             (_, Some(_)) => {
                 let why = "there is a background_file too; leave one of them empty";
                 return Err(row.error(Some("background_power"), why));
             }
         };
-        let needed = |file, sha256| {
-            Stream::of(row, file, sha256)?.ok_or_else(|| row.error(Some(file), "no file is named"))
+        let pac = Stream::of(row, "pac_file", "pac_sha256")?;
+        let [
+            lot,
+            operator,
+            note,
+            moved,
+            finger,
+            calibrated,
+            pace,
+            _,
+            session,
+            run,
+            highest,
+        ] = LABELS.map(|column| row.text(column).to_owned());
+        let code = match finger.as_str() {
+            "" => FingerCode::BIOTAC,
+            name => name.parse().unwrap_or(FingerCode::OTHER),
         };
-        let [lot, operator, note, moved, finger, calibrated, pace, _] =
-            LABELS.map(|column| row.text(column).to_owned());
+        if code == FingerCode::OTHER {
+            valid_name(&finger).map_err(|why| row.error(Some("finger"), why))?;
+        }
         let moved = match moved.as_str() {
             "" => None,
             "yes" => Some(true),
@@ -218,10 +252,14 @@ impl Entry {
                 operator,
                 note,
                 moved,
-                finger: match finger.as_str() {
-                    "" => FingerCode::BIOTAC,
-                    _ => row.parse("finger", "a finger: biotac, analog or mems")?,
+                session,
+                run,
+                sensor: if code == FingerCode::OTHER {
+                    finger
+                } else {
+                    String::new()
                 },
+                finger: code,
                 calibrated: match calibrated.as_str() {
                     "" => 0,
                     _ => row.parse("calibrated", "a day as 20261121")?,
@@ -229,8 +267,8 @@ impl Entry {
             },
             window: (row.number("window_start_s")?, row.number("window_end_s")?),
             background,
-            pac: needed("pac_file", "pac_sha256")?,
-            pdc: needed("pdc_file", "pdc_sha256")?,
+            pac: pac.ok_or_else(|| row.error(Some("pac_file"), "no file is named"))?,
+            pdc: Stream::of(row, "pdc_file", "pdc_sha256")?,
             pdc_rate_hz: rate("pdc_rate_hz")?,
             shear: Stream::of(row, "shear_file", "shear_sha256")?,
             shear_rate_hz: rate("shear_rate_hz")?,
@@ -238,12 +276,16 @@ impl Entry {
                 "" => None,
                 _ => Some(row.parse("pace", "a whole number of 1/1024")?),
             },
+            highest_hz: match highest.as_str() {
+                "" => None,
+                _ => Some(row.number("highest_hz")?),
+            },
         })
     }
 
     fn load(&self, folder: &Path, texture: usize) -> Result<Recording> {
         let pac = self.pac.load(folder)?;
-        let pdc = self.pdc.load(folder)?;
+        let pdc = self.pdc.as_ref().map(|s| s.load(folder)).transpose()?;
         let shear = self.shear.as_ref().map(|s| s.load(folder)).transpose()?;
         let (background, still) = match &self.background {
             Background::Power(power) => (Some(*power), Vec::new()),
@@ -256,11 +298,12 @@ impl Entry {
             window: self.window,
             blocks: Vec::new(),
             background,
-            pdc,
+            pdc: pdc.unwrap_or_default(),
             pdc_rate_hz: self.pdc_rate_hz,
             outside_mn: None,
             pace: self.pace,
             shear_rate_hz: self.shear_rate_hz,
+            highest_hz: self.highest_hz,
         };
         let slide = slide.cut(&still, &pac, shear.as_deref());
         slide.map_err(|cause| {
@@ -276,7 +319,6 @@ impl Stream {
         match (row.text(file), row.text(sha256)) {
             ("", "") => Ok(None),
             ("", _) => Err(row.error(Some(file), "a hash, but no file is named")),
-            (_, "") => Err(row.error(Some(sha256), "a file without its hash")),
             (name, hash) => Ok(Some(Self {
                 file: name.to_owned(),
                 sha256: hash.to_owned(),
@@ -287,7 +329,9 @@ impl Stream {
     fn load(&self, folder: &Path) -> Result<Vec<i16>> {
         let bytes = read_named(folder, MANIFEST, &self.file, npy::MAX_BYTES)?;
         let path = folder.join(&self.file);
-        check_hash(&path, "the file", &bytes, &self.sha256)?;
+        if !self.sha256.is_empty() {
+            check_hash(&path, "the file", &bytes, &self.sha256)?;
+        }
         npy::read(&bytes).map_err(|why| RecordingError::at(&path, why))
     }
 }

@@ -31,6 +31,7 @@ fn slide(texture: usize, number: u32) -> Recording {
         outside_mn: None,
         pace: None,
         shear_rate_hz: 110,
+        highest_hz: None,
     };
     slide.cut(&[], &pac, Some(&[-base; 11])).unwrap()
 }
@@ -235,7 +236,7 @@ fn damaged_npy_files_are_refused() {
             header("{'descr': '<i2', 'fortran_order': False, 'shape': (18446744073709551615,), }"),
             "samples by the .npy header: 18446744073709551615;",
         ),
-        (header(&"{[(".repeat(60)), "the type is not '<i2'"),
+        (header(&"{[(".repeat(60)), "the .npy header is {[("),
     ] {
         // with a manifest that has the right hash of the wrong file
         let (folder, _) = own();
@@ -380,6 +381,9 @@ fn npyz_reads_what_is_written_and_writes_what_is_read() {
 fn labels_come_back_and_may_be_missing() {
     let folder = tempfile::tempdir().unwrap();
     let given = Labels {
+        session: "monday".to_owned(),
+        run: "7".to_owned(),
+        sensor: String::new(),
         lot: "7, front".to_owned(),
         operator: "Ánna \"A\"".to_owned(),
         note: String::new(),
@@ -437,16 +441,21 @@ fn labels_come_back_and_may_be_missing() {
     let manifest = folder.path().join("manifest.csv");
     let text = fs::read_to_string(&manifest).unwrap();
     let bare = text.replace(
-        ",lot,operator,note,moved,finger,calibrated,pace,version",
+        ",lot,operator,note,moved,finger,calibrated,pace,version,session,run,highest_hz",
         "",
     );
     let bare = bare.replace(
-        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121,-341,1",
+        ",\"7, front\",\"Ánna \"\"A\"\"\",,no,finger-200,20261121,-341,1,monday,7,",
         "",
     );
     let bare: String = bare
         .lines()
-        .map(|line| format!("{}\n", line.strip_suffix(",,,,,biotac,,,1").unwrap_or(line)))
+        .map(|line| {
+            format!(
+                "{}\n",
+                line.strip_suffix(",,,,,biotac,,,1,,,").unwrap_or(line)
+            )
+        })
         .collect();
     fs::write(&manifest, bare).unwrap();
     assert_eq!(

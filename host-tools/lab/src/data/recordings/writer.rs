@@ -17,6 +17,7 @@ use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
+use tactus_core::sensor::FingerCode;
 
 const ROWS: &str = "manifest.csv.part";
 /// Columns of [`COLUMNS`]: texture, name, slide; and of files, each followed by or before its hash.
@@ -205,21 +206,30 @@ fn row(
     };
     let none = || [String::new(), String::new()];
     let (power, background) = match slide.background {
+        // 0 counts^2 is no power of a sensor
+        Some(0.0) => (String::new(), none()),
         Some(power) => (power.to_string(), none()),
         None => (String::new(), stream("still", &slide.still())?),
     };
     let pac = stream("pac", &slide.pac())?;
-    let pdc = stream("pdc", &slide.pdc)?;
+    let pdc = match &slide.pdc[..] {
+        [] => none(),
+        pdc => stream("pdc", pdc)?,
+    };
     let shear = match slide.shear_mn() {
         Some(shear) => stream("shear", &shear)?,
         None => none(),
+    };
+    let known = |value| match slide.movement.is_known() {
+        true => thousandths(value),
+        false => String::new(),
     };
     let mut row = vec![
         texture.id.to_string(),
         texture.name.trim().to_owned(),
         slide.number.to_string(),
-        thousandths(u32::from(slide.movement.force_mn())),
-        thousandths(slide.movement.speed_um_s()),
+        known(u32::from(slide.movement.force_mn())),
+        known(slide.movement.speed_um_s()),
         slide.window.0.to_string(),
         slide.window.1.to_string(),
         power,
@@ -235,12 +245,18 @@ fn row(
     row.extend([&labels.lot, &labels.operator, &labels.note].map(Clone::clone));
     let moved = labels.moved.map(|moved| if moved { "yes" } else { "no" });
     row.push(moved.unwrap_or_default().to_owned());
-    row.push(labels.finger.to_string());
+    row.push(match labels.finger {
+        FingerCode::OTHER => labels.sensor.clone(),
+        finger => finger.to_string(),
+    });
     let day = (labels.calibrated != 0).then(|| labels.calibrated.to_string());
     row.push(day.unwrap_or_default());
     let pace = slide.pace.map(|pace| pace.to_string());
     row.push(pace.unwrap_or_default());
     row.push(VERSION.to_string());
+    row.extend([&labels.session, &labels.run].map(Clone::clone));
+    let highest = slide.highest_hz.map(|hz| hz.to_string());
+    row.push(highest.unwrap_or_default());
     Ok(row)
 }
 

@@ -81,6 +81,7 @@ fn biotac_layout_is_taken_from_the_manifest() {
         outside_mn: None,
         pace: None,
         shear_rate_hz: 400,
+        highest_hz: None,
     };
     let expected = expected.cut(&[], &pac, Some(&[943, 944])).unwrap();
     assert_eq!(slides[1], expected);

@@ -33,6 +33,7 @@ proptest! {
             outside_mn: None,
             pace: None,
             shear_rate_hz: 100,
+            highest_hz: None,
         };
         let slide = slide.cut(still, &pac, shear.as_deref()).unwrap();
         prop_assert_eq!((slide.pac(), slide.shear_mn()), (pac, shear));

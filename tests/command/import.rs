@@ -1,0 +1,300 @@
+//! Files of any sensor, from the file to the verdict by two commands.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use tactus_lab::data::recordings::RecordingSet;
+
+use crate::{Scratch, assert_says};
+
+const TEXTURES: [(&str, f64); 4] = [
+    ("cork", 0.02),
+    ("denim", 0.045),
+    ("silk", 0.1),
+    ("suede", 0.17),
+];
+const EACH: usize = 7;
+
+/// A recording: still, a slide in which a resonance that is the texture's rings, still. `octave` says how far below the
+/// rate all of it is.
+fn recording(texture: usize, number: usize, rate_hz: f64, octave: f64) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64((texture * 100 + number) as u64);
+    let seconds = if rate_hz < 500.0 { 44.0 } else { 2.4 };
+    let samples = (seconds * rate_hz) as usize;
+    let turns = TEXTURES[texture].1 * octave;
+    let (near, pole) = (
+        2.0 * (std::f64::consts::TAU * turns).cos(),
+        1.0 - 0.3 * turns,
+    );
+    let (mut one, mut two) = (0.0, 0.0);
+    let mut sample = |n: usize| {
+        let place = n as f64 / samples as f64;
+        let strength = if (0.2..0.9).contains(&place) {
+            1.0
+        } else {
+            0.01
+        };
+        let drive = strength * random.random_range(-1.0..1.0);
+        let out = drive + pole * near * one - pole * pole * two;
+        (two, one) = (one, out);
+        out
+    };
+    let all: Vec<f64> = (0..samples).map(&mut sample).collect();
+    let peak = all.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    all.into_iter().map(|x| x / peak).collect()
+}
+
+/// All recordings, as this layout has each: the texture's name, its number, and the samples.
+fn each(rate_hz: f64, octave: f64, mut put: impl FnMut(&str, usize, &[f64])) {
+    for (texture, (name, _)) in TEXTURES.iter().enumerate() {
+        for number in 0..EACH {
+            put(name, number, &recording(texture, number, rate_hz, octave));
+        }
+    }
+}
+
+fn wav(rate: u32, bits: u16, channels: &[&[f64]]) -> Vec<u8> {
+    let float = bits == 32;
+    let bytes = usize::from(bits / 8);
+    let mut data = Vec::new();
+    for n in 0..channels[0].len() {
+        for channel in channels {
+            // a fifth of full scale is plenty
+            let x = channel[n] * 0.2;
+            match float {
+                true => data.extend((x as f32).to_le_bytes()),
+                false => {
+                    let full = f64::from(1_u32 << (bits - 1));
+                    data.extend(&((x * full) as i32).to_le_bytes()[..bytes]);
+                }
+            }
+        }
+    }
+    let frame = channels.len() * bytes;
+    let mut file = b"RIFF".to_vec();
+    file.extend((36 + data.len() as u32).to_le_bytes());
+    file.extend(b"WAVEfmt \x10\0\0\0");
+    file.extend(if float { 3_u16 } else { 1 }.to_le_bytes());
+    file.extend((channels.len() as u16).to_le_bytes());
+    file.extend(rate.to_le_bytes());
+    file.extend((rate * frame as u32).to_le_bytes());
+    file.extend((frame as u16).to_le_bytes());
+    file.extend(bits.to_le_bytes());
+    file.extend(b"data");
+    file.extend((data.len() as u32).to_le_bytes());
+    file.extend(data);
+    file
+}
+
+fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
+    let header = format!("{header:<117}\n");
+    [b"\x93NUMPY\x01\0\x76\0", header.as_bytes(), data].concat()
+}
+
+/// Imports, and has the evaluation say how many of the names are right.
+fn verdict(at: &Scratch, options: &str) -> RecordingSet {
+    let import = at.printed(&format!("import data recordings {options}"));
+    assert_says(&import, &["cork", "suede", "recordings: written"]);
+    let said = at.printed("evaluate --recordings recordings --train-slides 4 --runs 200");
+    let line = said
+        .lines()
+        .find(|line| line.contains("most probable one right"));
+    let share = line.and_then(|line| line.split_whitespace().rev().nth(1)?.parse::<f64>().ok());
+    assert!(share.unwrap() > 95.0, "{options}: {said}");
+    RecordingSet::open(&at.path("recordings")).unwrap()
+}
+
+#[test]
+fn wav_files_of_folders_and_of_names() {
+    let at = Scratch::new();
+    each(44_100.0, 0.05, |name, number, x| {
+        at.write(
+            &format!("data/{name}/take {number}.wav"),
+            wav(44_100, 16, &[x]),
+        );
+    });
+    let set = verdict(&at, "");
+    // the still part is the background
+    assert!(
+        set.load_texture(0)
+            .unwrap()
+            .iter()
+            .all(|s| s.still().len() > 300 && s.pdc.is_empty())
+    );
+
+    let at = Scratch::new();
+    each(8000.0, 0.28, |name, number, x| {
+        let silence = vec![0.0; x.len()];
+        at.write(
+            &format!("data/{name}_{number}.wav"),
+            wav(8000, 32, &[&silence, x]),
+        );
+    });
+    verdict(&at, "");
+
+    let at = Scratch::new();
+    each(192_000.0, 0.0115, |name, number, x| {
+        at.write(
+            &format!("data/x-{name}-{number}.wav"),
+            wav(192_000, 24, &[x]),
+        );
+    });
+    verdict(&at, "--texture x-{texture}-*.wav");
+}
+
+#[test]
+fn tables_with_time_and_without() {
+    let at = Scratch::new();
+    each(1000.0, 1.0, |name, number, x| {
+        let mut text = "time_s,ax,ay\n".to_owned();
+        for (n, x) in x.iter().enumerate() {
+            let _ = writeln!(text, "{:.4},{:.5},{:.5}", n as f64 / 1000.0, 9.81, x);
+        }
+        at.write(&format!("data/{name}/{number}.csv"), text);
+    });
+    let set = verdict(&at, "--finger 'glued accelerometer'");
+    assert_eq!(set.sensor().unwrap().to_string(), "glued accelerometer");
+    assert_eq!(set.load_texture(0).unwrap()[0].highest_hz, Some(500.0));
+
+    let at = Scratch::new();
+    each(2000.0, 0.9, |name, number, x| {
+        let mut text = "# von Hand\nZeit;Beschleunigung\n".to_owned();
+        for (n, x) in x.iter().enumerate() {
+            let line = format!("{:.5};{:.5}", n as f64 / 2000.0, x);
+            let _ = writeln!(text, "{}", line.replace('.', ","));
+        }
+        at.write(
+            &format!("data/tag1/{name}/{number}.csv"),
+            format!("\u{feff}{text}"),
+        );
+    });
+    verdict(&at, "");
+
+    let at = Scratch::new();
+    each(3000.0, 0.7, |name, number, x| {
+        let lines: String = x.iter().map(|x| format!("7\t{x:.5}\n")).collect();
+        at.write(&format!("data/{name}/{number}.tsv"), lines);
+    });
+    let why = at.error("import data recordings", 1);
+    assert_says(&why, &["no rate", "--rate HZ", "--time COLUMN"]);
+    verdict(&at, "--rate 3000");
+}
+
+#[test]
+fn arrays_and_one_long_table() {
+    let at = Scratch::new();
+    each(2200.0, 1.0, |name, number, x| {
+        let data: Vec<u8> = x.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect();
+        at.write(
+            &format!("data/{name}/{number}.npy"),
+            npy("<f4", &format!("{},", x.len()), &data),
+        );
+    });
+    at.write("data/import.toml", "rate = 2200\n");
+    verdict(&at, "");
+
+    let at = Scratch::new();
+    each(10_000.0, 0.22, |name, number, x| {
+        let data: Vec<u8> = x
+            .iter()
+            .flat_map(|x| [0.5, *x])
+            .flat_map(f64::to_be_bytes)
+            .collect();
+        at.write(
+            &format!("data/{name}/{number}.npy"),
+            npy(">f8", &format!("{}, 2", x.len()), &data),
+        );
+    });
+    verdict(&at, "--rate 10000 --channel 2 --speed 40 --force 0.8");
+
+    // a robot's slow log, packed, with a column that names the ground
+    let at = Scratch::new();
+    let mut text = "t_ms,z,ground\n".to_owned();
+    let mut n = 0;
+    each(100.0, 1.0, |name, _, x| {
+        for x in x {
+            let _ = writeln!(text, "{},{x:.5},{name}", n * 10);
+            n += 1;
+        }
+        // nothing between two of them
+        for _ in 0..3 {
+            let _ = writeln!(text, "{},0,", n * 10);
+            n += 1;
+        }
+    });
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed.write_all(text.as_bytes()).unwrap();
+    at.write("data/log.csv.gz", packed.finish().unwrap());
+    verdict(&at, "--texture ground");
+
+    // time in microseconds, pressure and shear beside it, sessions as folders
+    let at = Scratch::new();
+    each(5000.0, 0.42, |name, number, x| {
+        let mut text = "timestamp (us),acc,press,drag_n\n".to_owned();
+        for (n, x) in x.iter().enumerate() {
+            let slow = (n as f64 / 400.0).sin();
+            let _ = writeln!(
+                text,
+                "{},{x:.5},{:.3},{:.3}",
+                n * 200,
+                3.0 + 0.1 * slow,
+                0.4
+            );
+        }
+        at.write(&format!("data/day{}/{name}/{number}.csv", number % 2), text);
+    });
+    let set = verdict(&at, "--pressure press --shear drag_n");
+    let slide = &set.load_texture(0).unwrap()[0];
+    assert!(slide.pdc.iter().all(|p| *p > 1500) && slide.shear_mn().unwrap().contains(&400));
+    assert_eq!(set.slides(0)[0].labels.session, "day0");
+}
+
+#[test]
+fn a_gap_leaves_its_slide_out_and_is_named() {
+    let at = Scratch::new();
+    each(1000.0, 1.0, |name, number, x| {
+        let mut text = "time_s,a\n".to_owned();
+        for (n, x) in x.iter().enumerate() {
+            // in the middle of the first one the clock jumps by half a second
+            let jump = if number == 0 && n > 1300 { 0.5 } else { 0.0 };
+            let _ = writeln!(text, "{:.4},{x:.5}", n as f64 / 1000.0 + jump);
+        }
+        at.write(&format!("data/{name}/{number}.csv"), text);
+    });
+    let said = at.printed("import data recordings --dry-run");
+    assert_says(
+        &said,
+        &["cork/0.csv: 1 slide left out, samples are missing"],
+    );
+    assert!(!at.path("recordings").exists());
+    assert!(!said.contains("cork/1.csv: 1 slide left out"));
+}
+
+#[test]
+fn a_first_look_writes_what_can_be_corrected() {
+    let at = Scratch::new();
+    each(2200.0, 1.0, |name, number, x| {
+        at.write(&format!("data/{name}/{number}.wav"), wav(2200, 16, &[x]));
+    });
+    at.printed("import data --template");
+    let text = String::from_utf8(at.read("data/import.toml")).unwrap();
+    assert_says(&text, &["rate = 2200.0", "gain = ", "# texture = "]);
+    assert_says(
+        &at.error("import data --template", 1),
+        &["import.toml", "is there already"],
+    );
+    verdict(&at, "");
+    assert_says(
+        &at.error("import data recordings", 1),
+        &["already holds recordings"],
+    );
+    let nothing = Scratch::new();
+    nothing.write("data/readme.md", "no data");
+    assert_says(
+        &nothing.error("import data recordings", 1),
+        &["no file in it ends with wav"],
+    );
+}
