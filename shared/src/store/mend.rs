@@ -12,7 +12,7 @@ use heapless::Vec;
 use super::correct::Checksum;
 use super::error::StoreError;
 use super::layout::{WORD, correct_header};
-use super::pages::{Pages, page_size};
+use super::pages::{HEAD, Pages, SEALED, page_size};
 use super::records::RECORD;
 use super::sectors::Store;
 
@@ -26,8 +26,6 @@ const LENGTH: Checksum = Checksum {
     highest: 1 << 15,
 };
 const LENGTH_FIRST: u32 = 0xFFFF;
-/// Bytes in front of a record's data: checksum, length, checksum of the length.
-const HEAD: usize = 8;
 /// Bits of a record that are put right: less than half of the distance of its code, which is 6.
 const MOST: u8 = 2;
 /// Records that are kept in mind: as many as bits that the flash may have lost.
@@ -137,7 +135,10 @@ impl<F: NorFlash> Store<F> {
             return Ok(Some(item));
         }
         self.in_pages(data_at, data).await?;
-        let is_torn = data.ends_with(&[0xFF; WORD]);
+        let blank = data.as_chunks::<WORD>().0.iter();
+        let blank = blank.filter(|word| **word == [0xFF; WORD]).count();
+        let is_sealed = bytes == SEALED as usize && blank > 1;
+        let is_torn = data.ends_with(&[0xFF; WORD]) || is_sealed;
         [item.key, ..] = *word;
         item.bytes = bytes;
         let Some((data, behind)) = word
@@ -170,6 +171,14 @@ impl<F: NorFlash> Store<F> {
         }
         Ok(Some(item))
     }
+}
+
+/// The length in a head whose checksum fits.
+pub(super) fn exact_length([low, high, a, b]: [u8; WORD]) -> Option<usize> {
+    let computed = LENGTH.remainder(&[low, high], LENGTH_FIRST) ^ LENGTH_FIRST;
+    // that of a length is never blank
+    let stored = u32::from(u16::from_le_bytes([a, b]));
+    (computed.min(0xFFFE) == stored).then_some(u16::from_le_bytes([low, high]).into())
 }
 
 /// The length in front of a record, by its checksum behind it, and whether no bit of them had changed; 0 where there is

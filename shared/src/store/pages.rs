@@ -8,10 +8,18 @@
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 
 use super::layout::WORD;
+use super::mend::exact_length;
+use super::records::RECORD;
 
 const ERASING: [u8; WORD] = *b"eras";
 const WIPING: [u8; WORD] = *b"wipe";
 const DONE: [u8; WORD] = [0; WORD];
+/// Bytes in front of a record's data: checksum, length, checksum of the length.
+pub(super) const HEAD: usize = 8;
+/// The second word of a head: a record of [`SEALED`] bytes. No word that a cut leaves of it is another length that fits
+/// into a page.
+const SEAL: [u8; WORD] = [SEALED as u8, 0, 0x7F, 0xFD];
+pub(super) const SEALED: u32 = 20;
 /// Bytes at the end of a sector that are not the page's.
 const TRAILER: usize = 16;
 /// `sequential-storage` takes a page for a used one from so many zero bits on in the page's first word.
@@ -98,6 +106,48 @@ impl<F: NorFlash> Pages<'_, F> {
             let used = u32::from_le_bytes(first).count_zeros() >= MARKED;
             if !used && !self.is_blank(page).await? {
                 self.erase_sector(page).await?;
+            }
+        }
+        self.seal().await
+    }
+
+    /// Makes what a cut has left of a head, one word or parts of two, a head of its own: the map would take
+    /// the checksum of the next record for its length, once in 65536 times, and lose what is behind it. A head that is
+    /// longer than any record is none, and is cleared: every reading of the page would end there.
+    pub(super) async fn seal(&mut self) -> Result<(), F::Error> {
+        let size = Self::SIZE as u32;
+        for page in 0..2 {
+            let end = (page + 1) * size - WORD as u32;
+            let mut at = page * size + WORD as u32;
+            let mut is_loose = false;
+            let mut head = [0; HEAD];
+            while at + HEAD as u32 <= end {
+                self.read(at, &mut head).await?;
+                if head == [0xFF; HEAD] {
+                    break;
+                }
+                let [_, _, _, _, length @ ..] = head;
+                let whole = exact_length(length).map(|bytes| bytes.next_multiple_of(WORD) as u32);
+                let next = whole
+                    .map(|bytes| at + HEAD as u32 + bytes)
+                    .filter(|next| *next <= end);
+                let is_record = whole.is_some_and(|bytes| bytes <= RECORD as u32);
+                if next.is_some() && !is_record {
+                    self.write(at + WORD as u32, &[0; WORD]).await?;
+                }
+                is_loose = next.is_none() || !is_record;
+                at = next.filter(|_| is_record).unwrap_or(at + WORD as u32);
+            }
+            if !is_loose || at + HEAD as u32 > end {
+                continue;
+            }
+            if at + WORD as u32 + SEALED <= end {
+                self.write(at, &SEAL).await?;
+                continue;
+            }
+            // nothing fits behind it any more
+            for at in (at..end).step_by(WORD) {
+                self.write(at, &[0; WORD]).await?;
             }
         }
         Ok(())

@@ -116,20 +116,29 @@ type Items<'m, 'f, F> = map::MapItemIter<'m, u8, Pages<'f, F>, Places>;
 pub(super) struct Records<'m, 'f, F: NorFlash, T> {
     items: Items<'m, 'f, F>,
     kind: PhantomData<T>,
+    /// The key of one that is whole and no record of this kind: it hides no other.
+    pub(super) foreign: Option<u8>,
 }
 
 impl<'m, 'f, F: NorFlash, T: Record> Records<'m, 'f, F, T> {
     pub(super) fn new(items: Items<'m, 'f, F>) -> Self {
-        let kind = PhantomData;
-        Self { items, kind }
+        Self {
+            items,
+            kind: PhantomData,
+            foreign: None,
+        }
     }
 
-    /// Place and record, `None` for a place that was cleared.
+    /// Place and record, `None` for a place that was cleared or holds none.
     pub(super) async fn next(&mut self) -> Result<Option<(u8, Option<T>)>, StoreError> {
         let mut buffer = [0; RECORD];
         while let Some((key, bytes)) = self.items.next::<&[u8]>(&mut buffer).await? {
             if (T::FIRST..T::FIRST + T::PLACES).contains(&key) {
-                return Ok(Some((key - T::FIRST, decode(bytes)?)));
+                let record = decode(bytes).unwrap_or_else(|_| {
+                    self.foreign = Some(key);
+                    None
+                });
+                return Ok(Some((key - T::FIRST, record)));
             }
         }
         Ok(None)

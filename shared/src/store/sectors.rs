@@ -18,6 +18,8 @@ pub struct Store<F> {
     pub(super) settings: Result<bool, SettingsError>,
     /// Key of a record that was damaged when the store was opened, and could not be put right.
     pub(super) lost: Option<u8>,
+    /// A write to the settings has not ended well: what it left may have to be sealed.
+    pub(super) is_unsure: bool,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -39,6 +41,7 @@ impl<F: NorFlash> Store<F> {
             slots: Slots::default(),
             settings: Err(SettingsError::Corrupt),
             lost: None,
+            is_unsure: false,
         };
         if store.flash.capacity() < UNITS * F::ERASE_SIZE {
             return Err(StoreError::NoSpace(store.flash.capacity()));
@@ -55,6 +58,11 @@ impl<F: NorFlash> Store<F> {
 
     pub(super) async fn read(&mut self, offset: u32, buffer: &mut [u8]) -> Result<(), StoreError> {
         let done = self.flash.read(offset, buffer).await;
+        done.map_err(StoreError::flash)
+    }
+
+    pub(super) async fn erase(&mut self, from: u32, to: u32) -> Result<(), StoreError> {
+        let done = self.flash.erase(from, to).await;
         done.map_err(StoreError::flash)
     }
 

@@ -1,5 +1,7 @@
 //! The settings: one record per key in a `sequential-storage` map.
 
+use core::mem;
+
 use embedded_storage_async::nor_flash::NorFlash;
 use sequential_storage::cache::key_pointers::ArrayKeyPointers;
 use sequential_storage::cache::{Cache, Uncached};
@@ -304,10 +306,13 @@ impl<F: NorFlash> Store<F> {
         let mut records =
             Records::<F, TrainingRecord>::new(map.fetch_all_items(&mut buffer).await?);
         while records.next().await?.is_some() {}
+        let mut foreign = records.foreign;
         let mut map = self.map();
         let mut records =
             Records::<F, SelfLearnedRecord>::new(map.fetch_all_items(&mut buffer).await?);
         while records.next().await?.is_some() {}
+        foreign = foreign.or(records.foreign);
+        self.lost = self.lost.or(foreign);
         Ok(true)
     }
 
@@ -356,14 +361,26 @@ impl<F: NorFlash> Store<F> {
         self.store_checked(key, bytes).await
     }
 
-    /// Stores a record and reads it back. Where bits of the flash no longer change, it is stored behind them.
+    /// Stores a record and reads it back as the next start will. Where bits of the flash no longer change, it is stored
+    /// behind them.
     pub(super) async fn store_checked(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreError> {
         let mut buffer = [0; RECORD];
         for _ in 0..TRIES {
-            let mut map = self.map();
-            map.store_item(&mut buffer, &key, &bytes).await?;
-            if map.fetch_item::<&[u8]>(&mut buffer, &key).await? == Some(bytes) {
-                return Ok(());
+            // after a write that failed, or was given up
+            if mem::replace(&mut self.is_unsure, true) {
+                let sealed = Pages(&mut self.flash).seal().await;
+                sealed.map_err(StoreError::flash)?;
+            }
+            self.map().store_item(&mut buffer, &key, &bytes).await?;
+            // by a map that does not know where it was written, as after the next start
+            let back = self.map().fetch_item::<&[u8]>(&mut buffer, &key).await;
+            match back.map_err(StoreError::from) {
+                Ok(back) if back == Some(bytes) => {
+                    self.is_unsure = false;
+                    return Ok(());
+                }
+                Ok(_) | Err(StoreError::Settings(_)) => {}
+                Err(why) => return Err(why),
             }
         }
         Err(StoreError::Worn)

@@ -72,10 +72,7 @@ impl<F: NorFlash> Store<F> {
         };
         let slot = self.slots.next(pair);
         *self.slots.usable(slot) = 0;
-        self.flash
-            .erase(slot.start::<F>(), slot.end::<F>())
-            .await
-            .map_err(StoreError::flash)?;
+        self.erase(slot.start::<F>(), slot.end::<F>()).await?;
         self.slots.push = Some(Push {
             slot,
             length,
@@ -165,6 +162,8 @@ impl<F: NorFlash> Store<F> {
             .await?;
         self.slots.generation = stored.generation;
         if self.commit_word(slot).await? != COMMIT {
+            // it may count as one, with bits that are wrong
+            self.give_up(slot).await?;
             return Err(StoreError::Worn);
         }
         *self.slots.usable(slot) = stored.generation;
@@ -194,15 +193,28 @@ impl<F: NorFlash> Store<F> {
         let others = Slot::ALL.into_iter().filter(|slot| Some(*slot) != active);
         // the older ones first: the active one hides them until it is given up itself
         for slot in others.chain(active) {
-            if is_committed(self.commit_word(slot).await?) {
-                self.program(slot.start::<F>() + COMMIT_AT, &[0; WORD])
-                    .await?;
-            }
+            self.give_up(slot).await?;
+            *self.slots.usable(slot) = 0;
         }
-        self.slots.usable = [0; 4];
         self.slots.active = None;
         self.slots.damaged = None;
         Ok(())
+    }
+
+    /// Makes the table of a slot none: clears its commit word, or erases it where bits of that word stay.
+    /// Errors: [`StoreError::Worn`] where it counts as one still.
+    async fn give_up(&mut self, slot: Slot) -> Result<(), StoreError> {
+        let (start, end) = (slot.start::<F>(), slot.end::<F>());
+        if is_committed(self.commit_word(slot).await?) {
+            self.program(start + COMMIT_AT, &[0; WORD]).await?;
+        }
+        if is_committed(self.commit_word(slot).await?) {
+            self.erase(start, end).await?;
+        }
+        match is_committed(self.commit_word(slot).await?) {
+            true => Err(StoreError::Worn),
+            false => Ok(()),
+        }
     }
 
     pub(super) async fn find_tables(&mut self, correct: Correct) -> Result<(), StoreError> {

@@ -1,6 +1,7 @@
 //! The store against a flash that loses its power at every word and in every erase.
 
 mod cuts;
+mod heads;
 pub(crate) mod ram;
 mod rot;
 mod self_learned;

@@ -50,6 +50,8 @@ pub(crate) struct Ram<const S: usize = SECTOR> {
     pub(crate) cut: Option<(usize, Torn)>,
     /// Bits have changed by themselves: writing to them is no mistake, and clears what it can.
     pub(crate) rotten: bool,
+    /// Bits that stay 1 whatever is written: byte, and which of it.
+    pub(crate) stuck: Vec<(usize, u8)>,
     dead: bool,
 }
 
@@ -62,6 +64,7 @@ impl<const S: usize> Ram<S> {
             worn: [0; SECTORS.len()],
             cut: None,
             rotten: false,
+            stuck: Vec::new(),
             dead: false,
         }
     }
@@ -70,6 +73,7 @@ impl<const S: usize> Ram<S> {
     pub(crate) fn again(self) -> Self {
         Self {
             bytes: self.bytes,
+            stuck: self.stuck,
             ..Self::new()
         }
     }
@@ -175,6 +179,11 @@ impl<const S: usize> NorFlash for Ram<S> {
                 Some(Torn::Bits(mut seed)) => new | next(&mut seed),
             };
             *buffer = (old & cleared).to_le_bytes();
+            for (byte, bits) in &self.stuck {
+                if let Some(cell) = byte.checked_sub(at).and_then(|n| buffer.get_mut(n)) {
+                    *cell |= bits;
+                }
+            }
             if torn.is_some() {
                 return Err(RamError::Cut);
             }
