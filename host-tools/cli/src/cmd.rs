@@ -13,6 +13,7 @@ mod learn;
 mod names;
 mod output;
 mod plot;
+mod printed;
 mod progress;
 mod report;
 mod simulate;
@@ -29,6 +30,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
+pub(crate) use printed::say;
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
@@ -87,7 +89,7 @@ Environment:
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
 pub(crate) fn run() -> anyhow::Result<Done> {
-    let out = &mut io::BufWriter::new(io::stdout().lock());
+    let out = &mut io::BufWriter::new(printed::Printed(io::stdout()));
     let mut done = Done::Fully;
     let Tactus { quiet, command } = Tactus::parse();
     if quiet {

@@ -1,5 +1,8 @@
 //! The command `tactus`.
 
+// they panic where nobody reads
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 mod cmd;
 
 use std::process::ExitCode;
@@ -8,10 +11,8 @@ fn main() -> ExitCode {
     match cmd::run() {
         Ok(cmd::Done::Fully) => ExitCode::SUCCESS,
         Ok(cmd::Done::NotIdentified) => ExitCode::from(3),
-        // `tactus features | head` is no failure
-        Err(why) if is_broken_pipe(&why) => ExitCode::SUCCESS,
         Err(why) => {
-            eprintln!("error: {why:#}");
+            cmd::say(format_args!("error: {why:#}"));
             match why.downcast_ref::<cmd::BenchError>() {
                 // as a shell has it: 128 and the number of SIGINT
                 Some(why) if why.is_interrupt() => ExitCode::from(130),
@@ -20,10 +21,4 @@ fn main() -> ExitCode {
             }
         }
     }
-}
-
-fn is_broken_pipe(why: &anyhow::Error) -> bool {
-    why.chain()
-        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|io| io.kind() == std::io::ErrorKind::BrokenPipe)
 }

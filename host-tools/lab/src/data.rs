@@ -9,7 +9,8 @@ pub mod recordings;
 pub mod replay;
 pub mod rows;
 pub mod table_file;
-pub mod whole;
+
+pub use tactus_link::whole;
 
 /// The rows of a table in a test, their cells divided by `|`.
 #[cfg(test)]

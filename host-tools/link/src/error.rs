@@ -26,6 +26,17 @@ pub enum PortError {
              runs there"
     )]
     Garbage(u64),
+    /// Reports come, and the request does not end.
+    #[error(
+        "the probe has not ended the request {request} in {longest:?}, which is longer than it takes, or sent more than \
+         that long a time of reports: switch it off and on, then ask again"
+    )]
+    Endless {
+        /// What was asked for.
+        request: String,
+        /// Longest time that it takes.
+        longest: Duration,
+    },
     /// See [`LinkError`].
     #[error(transparent)]
     Link(#[from] LinkError),

@@ -10,6 +10,7 @@ pub mod bringup;
 mod error;
 pub mod follow;
 pub mod lifting;
+mod limits;
 #[cfg(feature = "serial")]
 pub mod line;
 #[cfg(feature = "serial")]
@@ -23,8 +24,10 @@ mod request;
 pub mod samples;
 pub mod say;
 mod session;
+mod sound;
 mod table;
 mod transaction;
+pub mod whole;
 
 pub use error::{OperationError, PortError};
 pub use port::Port;

@@ -209,6 +209,7 @@ pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
     let stream = TcpStream::connect_timeout(&to, Duration::from_secs(5)).map_err(error)?;
     stream
         .set_read_timeout(Some(READ))
+        .and_then(|()| stream.set_write_timeout(Some(Duration::from_secs(5))))
         .and_then(|()| stream.set_nodelay(true))
         .map_err(error)?;
     Ok(Box::new(stream))

@@ -5,12 +5,14 @@
 //! the table in use (the parts that were read), the raw samples (blocks), what was measured, chosen and answered.
 
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, BufWriter, Read, Write};
+use std::io::{self, BufRead as _, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tactus_core::wire::{Command, PROTOCOL, Report};
+
+use super::sound::impossible;
+use super::whole::WholeFile;
 
 /// One line.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -48,26 +50,22 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Writes the log. A failure is kept until the caller asks for it.
+/// Writes the log, which gets its name when it ends. A failure is kept until the caller asks for it, and removes the
+/// log.
 #[derive(Debug)]
 pub struct Log {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: Option<WholeFile>,
     failed: io::Result<()>,
 }
 
 impl Log {
     /// Begins a log of what is said at a port; a file that is there already is left alone.
     pub fn create(path: &Path, port: &str) -> io::Result<Self> {
-        let file = File::create_new(path).map_err(|why| match why.kind() {
-            io::ErrorKind::AlreadyExists => {
-                io::Error::new(why.kind(), "is there already: give the log another name")
-            }
-            _ => why,
-        });
+        let file = WholeFile::create(path, false).map_err(|why| named(path, &why))?;
         let mut log = Self {
             path: path.to_owned(),
-            file: BufWriter::new(file.map_err(|why| named(path, &why))?),
+            file: Some(file),
             failed: Ok(()),
         };
         log.line(&Line::first(port));
@@ -77,16 +75,33 @@ impl Log {
 
     /// Writes a line.
     pub fn line(&mut self, line: &Line<'_>) {
-        if self.failed.is_ok() {
-            self.failed = line.write(&mut self.file);
+        if let (Some(file), Ok(())) = (&mut self.file, &self.failed) {
+            self.failed = line.write(file);
         }
     }
 
     /// Everything so far is in the file.
     pub fn flush(&mut self) -> io::Result<()> {
         let written = std::mem::replace(&mut self.failed, Ok(()));
-        let flushed = written.and_then(|()| self.file.flush());
-        flushed.map_err(|why| named(&self.path, &why))
+        let flushed = written.and_then(|()| self.file.as_mut().map_or(Ok(()), Write::flush));
+        flushed.map_err(|why| {
+            self.file = None;
+            named(&self.path, &why)
+        })
+    }
+
+    /// Ends the log, and gives it its name.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.flush()?;
+        let finished = self.file.take().map_or(Ok(()), WholeFile::finish);
+        finished.map_err(|why| named(&self.path, &why))
+    }
+}
+
+impl Drop for Log {
+    fn drop(&mut self) {
+        // a caller that wants to know has finished it
+        let _ = self.finish();
     }
 }
 
@@ -106,6 +121,14 @@ pub enum LogError {
         line: usize,
         /// What is wrong with it.
         why: serde_json::Error,
+    },
+    /// A report that no probe makes.
+    #[error("line {line} has a report that cannot be, with {what}: the log was changed")]
+    Impossible {
+        /// Its number, from 1.
+        line: usize,
+        /// What is wrong with it.
+        what: &'static str,
     },
     /// Messages of another version.
     #[error(
@@ -134,7 +157,14 @@ pub fn read(log: impl Read, mut each: impl FnMut(Line<'static>)) -> Result<(), L
             Line::Session { protocol, .. } if protocol != PROTOCOL => {
                 return Err(LogError::Protocol(protocol));
             }
-            line => each(line),
+            line => {
+                if let Line::Report(report) = &line
+                    && let Some(what) = impossible(&report.event)
+                {
+                    return Err(LogError::Impossible { line: number, what });
+                }
+                each(line);
+            }
         }
     }
     Ok(())

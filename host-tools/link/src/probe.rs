@@ -19,6 +19,7 @@ use tactus_core::wire::{Command, Event, Phase, Report, Status};
 
 use super::error::{OperationError, PortError};
 use super::lifting::{Lifting, RigWatch, Stopped, moves};
+use super::limits::Limits;
 use super::log::Line;
 use super::person::{Backup, Question, Words};
 use super::request::Request;
@@ -65,6 +66,12 @@ struct State {
     kept: Option<Result<String, String>>,
     /// the table in use, and its checksum
     table: Option<(u32, Arc<[u8]>)>,
+    /// the checksum that the probe says it has
+    in_use: Option<u32>,
+    /// movements of the table that was read last
+    movements: Option<usize>,
+    /// of the request under way
+    limits: Option<Limits>,
 }
 
 impl State {
@@ -97,7 +104,7 @@ impl State {
             _ => false,
         };
         if learns {
-            self.table = None;
+            (self.table, self.in_use) = (None, None);
         }
         let command = Box::new(std::borrow::Cow::Owned(command.clone()));
         self.said.push(Line::Command(command));
@@ -106,6 +113,11 @@ impl State {
     fn hear(&mut self, reports: &[Report]) {
         for report in reports {
             self.rig.hear(report, self.now);
+            match &report.event {
+                Event::Status(status) => self.in_use = Some(status.table_crc),
+                Event::TextureLearned(_) | Event::Booted { .. } => self.in_use = None,
+                _ => {}
+            }
             let in_use = match (&report.event, &self.table) {
                 (Event::TextureLearned(_) | Event::Booted { .. }, _) => false,
                 (Event::Status(status), Some((crc, _))) => *crc == status.table_crc,
@@ -120,7 +132,7 @@ impl State {
     }
 
     fn begin<E: Transaction>(&mut self, transaction: E) -> Result<Job<E>, OperationError> {
-        self.heard = self.now;
+        (self.heard, self.limits) = (self.now, None);
         let begun = Job::begin(transaction, &mut self.session, &mut self.send);
         let job = begun.map_err(|why| self.error(why.into(), false))?;
         if let Some(command) = job.command() {
@@ -172,6 +184,7 @@ impl State {
         job: &mut Job<E>,
         reports: &mut Vec<Report>,
     ) -> Result<Poll<E::Outcome>, PortError> {
+        self.limit(job)?;
         let received = take(&mut self.received);
         if !received.is_empty() {
             self.came.0 += received.len() as u64;
@@ -203,6 +216,27 @@ impl State {
             }
         }
         Ok(Poll::Pending)
+    }
+
+    /// Ends a request that is under way for too long.
+    fn limit<E: Transaction>(&mut self, job: &Job<E>) -> Result<(), PortError> {
+        let (id, Some(command)) = (job.first_id(), job.command()) else {
+            return Ok(());
+        };
+        let now = (self.now, self.came.0);
+        let limits = self
+            .limits
+            .take()
+            .filter(|limits| limits.are_of(id, command));
+        let limits = limits.unwrap_or_else(|| Limits::new((id, command), self.movements, now));
+        if let Some(longest) = limits.passed(self.now, self.came.0) {
+            let asked = format!("{command:?}");
+            let request = asked.split(|c: char| !c.is_alphanumeric()).next();
+            let request = request.unwrap_or_default().to_owned();
+            return Err(PortError::Endless { request, longest });
+        }
+        self.limits = Some(limits);
+        Ok(())
     }
 }
 
@@ -381,8 +415,13 @@ impl Probe {
             return Ok(Arc::clone(bytes));
         }
         let bytes: Arc<[u8]> = self.get(ReadTable::default()).await?.into();
-        let crc = Table::read(&bytes)?.crc();
-        self.state().table = Some((crc, Arc::clone(&bytes)));
+        let table = Table::read(&bytes)?;
+        let mut state = self.state();
+        if state.in_use.is_some_and(|crc| crc != table.crc()) {
+            return Err(state.error(LinkError::Changed.into(), false));
+        }
+        state.movements = Some(table.movements().len());
+        state.table = Some((table.crc(), Arc::clone(&bytes)));
         Ok(bytes)
     }
 

@@ -7,6 +7,8 @@ use tactus_core::wire::{
     TooLong,
 };
 
+use super::sound::impossible;
+
 /// A request that may be made twice is made so often before the line is given up.
 pub const MAX_TRIES: u8 = 5;
 
@@ -54,6 +56,18 @@ pub enum LinkError {
              firmware of this version, `tactus device flash`"
     )]
     Foreign,
+    /// Frames of requests come back.
+    #[error(
+        "the port sends back what it gets: TX and RX are joined, or local echo is on. Part the two wires, or turn the \
+         echo off"
+    )]
+    Echo,
+    /// A report that no probe makes.
+    #[error(
+        "the probe reports what cannot be, {0}: the report is damaged, and was not used. Switch the probe off and on; \
+         if it stays so, this is another device or another firmware"
+    )]
+    Impossible(&'static str),
     /// The request is over, and its answer did not come.
     #[error(
         "the probe was done without an answer: it was stopped, or the answer was lost; ask again"
@@ -93,6 +107,10 @@ pub struct Session {
     damaged: u64,
     foreign: u64,
     missing: u64,
+    /// understands what a host says
+    echo: Receiver,
+    /// Why nothing that comes in can be believed.
+    pub(crate) refused: Option<LinkError>,
 }
 
 impl Session {
@@ -107,15 +125,19 @@ impl Session {
         Ok(id)
     }
 
-    /// Takes in bytes as they come; the reports that end in them.
+    /// Takes in bytes as they come; the reports that end in them. One that cannot be is counted as damaged.
     pub fn receive(&mut self, bytes: &[u8]) -> Vec<Report> {
         let mut reports = Vec::new();
         for &byte in bytes {
+            let echo = self.echo.push::<wire::Request>(byte);
             match self.receiver.push::<Report>(byte) {
                 None => {}
                 Some(Err(why)) => {
                     self.damaged += 1;
                     self.foreign += u64::from(why == FrameError::Message);
+                    if let Some(Ok(_)) = echo {
+                        self.refused = Some(LinkError::Echo);
+                    }
                 }
                 Some(Ok(report)) => {
                     // a probe that boots counts anew
@@ -126,7 +148,13 @@ impl Session {
                         self.missing += u64::from(missing);
                     }
                     self.expected = Some(report.number.wrapping_add(1));
-                    reports.push(report);
+                    match impossible(&report.event) {
+                        None => reports.push(report),
+                        Some(what) => {
+                            self.damaged += 1;
+                            self.refused = Some(LinkError::Impossible(what));
+                        }
+                    }
                 }
             }
         }

@@ -4,6 +4,7 @@ use tactus_core::table::{MAX_TEXTURES, Table, TableError};
 use tactus_core::wire::{Command, Event, PART};
 
 use super::session::{LinkError, MAX_TRIES};
+use super::sound::{TEXT, is_printable};
 use super::transaction::Transaction;
 
 /// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and
@@ -116,6 +117,11 @@ impl Transaction for ReadTable {
         match Table::read(&self.bytes) {
             Err(TableError::Crc { .. }) => Err(LinkError::Changed),
             Err(why) => Err(why.into()),
+            // what the probe says of its length, or of a name, is not what is in it
+            Ok(table) if table.as_bytes().len() != self.bytes.len() => {
+                Err(LinkError::Impossible("bytes behind its table"))
+            }
+            Ok(table) if !table.names().all(is_printable) => Err(LinkError::Impossible(TEXT)),
             Ok(_) => Ok(std::mem::take(&mut self.bytes)),
         }
     }

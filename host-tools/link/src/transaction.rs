@@ -67,6 +67,7 @@ impl<E: Transaction> Job<E> {
     ) -> Poll<Result<E::Outcome, LinkError>> {
         let lost = session.damaged() + session.missing();
         let sent = self.last_id();
+        session.refused = None;
         // all that has come is shown, also what comes behind the end
         let mut over = None;
         for report in session.receive(received) {
@@ -74,6 +75,9 @@ impl<E: Transaction> Job<E> {
             if over.is_none() {
                 over = self.take(session, &report.event, send).transpose();
             }
+        }
+        if over.is_none() {
+            over = session.refused.take().map(Err);
         }
         let disturbed = session.damaged() + session.missing() > lost;
         if over.is_none() && disturbed && self.last_id() == sent {
@@ -105,6 +109,10 @@ impl<E: Transaction> Job<E> {
     /// The request that is under way.
     pub fn command(&self) -> Option<&Command> {
         self.sent.as_ref().map(|sent| &sent.command)
+    }
+
+    pub(crate) fn first_id(&self) -> Option<u16> {
+        self.sent.as_ref()?.ids.first().copied()
     }
 
     pub(crate) fn last_id(&self) -> Option<u16> {

@@ -8,7 +8,7 @@ use std::{fs, io};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use tactus_core::features::Property;
-use tactus_lab::data::whole::write_whole;
+use tactus_lab::data::whole::{Lock, write_whole};
 use tactus_lab::eval::evaluate::Method;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
@@ -54,6 +54,9 @@ pub enum ReportError {
     /// The folder has something in it.
     #[error("{}: is not empty; give --out a new folder, so that no study is mixed with another", .0.display())]
     Taken(PathBuf),
+    /// Another study is under way there.
+    #[error("{}: another study is written there now; give --out a new folder", .0.display())]
+    Busy(PathBuf),
     /// The system could not write.
     #[error("{} cannot be written; give --out a folder that can be written", path.display())]
     Io {
@@ -73,37 +76,58 @@ pub enum ReportError {
     Page(#[from] minijinja::Error),
 }
 
-/// Makes the folder of a report, or takes an empty one. Called before the work, which takes minutes.
+/// The lock in a folder whose study is not whole.
+const LOCK: &str = "INCOMPLETE.lock";
+
+/// Makes the folder of a report, or takes an empty one, or one that a study was killed in; it is this study's until the
+/// lock is dropped. Called before the work, which takes minutes.
 ///
 /// # Errors
 /// See [`ReportError`].
-pub fn prepare(folder: &Path) -> Result<(), ReportError> {
+pub fn prepare(folder: &Path) -> Result<Lock, ReportError> {
     let error = |source| ReportError::Io {
         path: folder.to_owned(),
         source,
     };
     fs::create_dir_all(folder).map_err(error)?;
-    match fs::read_dir(folder).map_err(error)?.next() {
-        Some(_) => Err(ReportError::Taken(folder.to_owned())),
-        None => Ok(()),
+    let lock = folder.join(LOCK);
+    let is_taken = fs::read_dir(folder).map_err(error)?.next().is_some();
+    if is_taken && !lock.is_file() {
+        return Err(ReportError::Taken(folder.to_owned()));
     }
+    Lock::take(&lock).map_err(|source| match source.kind() {
+        io::ErrorKind::ResourceBusy => ReportError::Busy(folder.to_owned()),
+        _ => error(source),
+    })
 }
 
-/// Writes everything of a study into its folder, the page last.
+/// Writes everything of a study into its folder, the page last; or nothing, where that fails.
 ///
 /// # Errors
 /// See [`ReportError`].
 pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
-    let put = |name: &str, bytes: &[u8]| {
+    let (json, page) = (
+        json(study)?,
+        render(include_str!("report/page.html"), &contents(study)?)?,
+    );
+    let tables = study.training.iter().flat_map(|t| &t.tables);
+    let tables = tables.map(|table| (table.file.as_str(), table.data.as_slice()));
+    let rest = [
+        ("study.json", json.as_bytes()),
+        ("report.html", page.as_bytes()),
+    ];
+    let files: Vec<(&str, &[u8])> = tables.chain(rest).collect();
+    for (name, bytes) in &files {
         let path = folder.join(name);
-        write_whole(&path, bytes).map_err(|source| ReportError::Io { path, source })
-    };
-    for table in study.training.iter().flat_map(|t| &t.tables) {
-        put(&table.file, &table.data)?;
+        if let Err(source) = write_whole(&path, bytes) {
+            for (name, _) in &files {
+                // those that were written
+                let _ = fs::remove_file(folder.join(name));
+            }
+            return Err(ReportError::Io { path, source });
+        }
     }
-    put("study.json", json(study)?.as_bytes())?;
-    let page = render(include_str!("report/page.html"), &contents(study)?)?;
-    put("report.html", page.as_bytes())
+    Ok(())
 }
 
 /// study.json.

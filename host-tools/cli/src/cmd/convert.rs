@@ -1,8 +1,7 @@
 //! `tactus convert`: a session's log as MCAP: messages in JSON, each channel with its schema.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -16,7 +15,7 @@ use tactus_core::wire::{Event, Report, SlideReport};
 use tactus_lab::data::recording::PAC_RATE_HZ;
 use tactus_link::log::{self, Line, TableParts};
 
-use super::table_file::{is_pipe, opened};
+use super::table_file::{Force, Output, is_pipe, opened};
 
 /// Convert a session's log to MCAP, for Foxglove and PlotJuggler
 #[derive(clap::Args)]
@@ -31,28 +30,18 @@ pub(crate) struct Args {
     /// The file to write; "-" writes to standard output
     #[arg(long, value_name = "FILE")]
     mcap: PathBuf,
+    #[command(flatten)]
+    force: Force,
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let Args { from, mcap } = args;
-    convert(create(mcap)?, from)?;
+    let Args { from, mcap, force } = args;
+    convert(Output::create(mcap, *force)?, from)?;
     if !is_pipe(mcap) {
         let bytes = std::fs::metadata(mcap)?.len();
         writeln!(out, "{}: {bytes} bytes", mcap.display())?;
     }
     Ok(())
-}
-
-type To = BufWriter<Box<dyn Write + Send>>;
-
-fn create(path: &Path) -> anyhow::Result<To> {
-    // the lock of standard output is this thread's
-    Ok(BufWriter::new(if is_pipe(path) {
-        Box::new(io::stdout())
-    } else {
-        let file = File::create_new(path);
-        Box::new(file.with_context(|| path.display().to_string())?)
-    }))
 }
 
 /// The channels, each with the fields of its messages, `name:kind` in JSON's words.
@@ -96,12 +85,12 @@ const WARNING: u8 = 3;
 const ERROR: u8 = 4;
 
 struct Writer {
-    mcap: mcap::Writer<NoSeek<To>>,
+    mcap: mcap::Writer<NoSeek<Output>>,
     channels: BTreeMap<&'static str, (u16, u32)>,
 }
 
 impl Writer {
-    fn new(to: To, of: &Path) -> anyhow::Result<Self> {
+    fn new(to: Output, of: &Path) -> anyhow::Result<Self> {
         let library = concat!("tactus ", env!("CARGO_PKG_VERSION"));
         // standard output cannot be sought in
         let options = WriteOptions::new().compression(None).library(library);
@@ -197,7 +186,7 @@ impl Writer {
 
     fn finish(mut self) -> anyhow::Result<()> {
         self.mcap.finish()?;
-        Ok(self.mcap.into_inner().into_inner().flush()?)
+        Ok(self.mcap.into_inner().into_inner().finish()?)
     }
 }
 
@@ -229,7 +218,7 @@ fn foxglove_log() -> Value {
     })
 }
 
-fn convert(to: To, from: &Path) -> anyhow::Result<()> {
+fn convert(to: Output, from: &Path) -> anyhow::Result<()> {
     let mut log = Converted::new(to, from)?;
     log::read(opened(from)?, |line| {
         if log.failed.is_ok() {
@@ -254,7 +243,7 @@ struct Converted {
 }
 
 impl Converted {
-    fn new(to: To, from: &Path) -> anyhow::Result<Self> {
+    fn new(to: Output, from: &Path) -> anyhow::Result<Self> {
         Ok(Self {
             to: Writer::new(to, from)?,
             now_ns: 0,

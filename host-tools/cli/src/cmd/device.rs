@@ -73,6 +73,12 @@ Examples:
 }
 
 pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<Done> {
+    let done = perform(command, out)?;
+    bench::logs_kept()?;
+    Ok(done)
+}
+
+fn perform(command: &Command, out: &mut impl Write) -> anyhow::Result<Done> {
     let done = match command {
         Command::Status(args) => status::run(args, out),
         Command::Doctor(args) => doctor::run(args, out),

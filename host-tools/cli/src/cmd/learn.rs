@@ -19,7 +19,7 @@ use tactus_lab::sim::collection::texture_name;
 
 use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
 use super::progress::with_progress;
-use super::table_file::{beside, write_table};
+use super::table_file::{Force, beside, write_file};
 use super::textures::{collection, measure_folder};
 
 /// Learn a texture table from the first slides of every texture
@@ -56,6 +56,8 @@ pub(crate) struct Args {
     /// The file to write; "-": standard output
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
 }
 
 /// Learn a handheld probe's table from slides of a simulated hand
@@ -68,6 +70,8 @@ pub(crate) struct ByHand {
     /// The file to write; "-": standard output
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
     /// Textures of Table 1, by number or name; all 117 unless given
     #[arg(long, value_name = "T,T,...", value_delimiter = ',')]
     textures: Vec<String>,
@@ -100,7 +104,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     )
     .with_context(|| folder.display().to_string())?;
     let bytes = with_lengths(args, &set, bytes, &expected)?;
-    write_table(&args.out, &bytes)?;
+    write_file(&args.out, &bytes, args.force)?;
     let out = &mut beside(&args.out, out);
     writeln!(
         out,
@@ -168,7 +172,7 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
     let (bytes, left_out) = with_progress(textures, "sliding by hand", |done| {
         tactus_lab::sim::handheld::learn_with(args.finger, &collection, done)
     })?;
-    write_table(&args.out, &bytes)?;
+    write_file(&args.out, &bytes, args.force)?;
     let out = &mut beside(&args.out, out);
     writeln!(
         out,

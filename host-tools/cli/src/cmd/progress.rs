@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::printed::say;
+
 static QUIET: OnceLock<()> = OnceLock::new();
 
 pub(crate) fn be_quiet() {
@@ -21,7 +23,7 @@ pub(crate) fn is_quiet() -> bool {
 /// Tells something beside the results, unless it is to be quiet.
 pub(crate) fn notice(what: &str) {
     if !is_quiet() {
-        eprintln!("{what}");
+        say(what);
     }
 }
 

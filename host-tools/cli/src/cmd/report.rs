@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde::Serialize;
 use tactus_core::table::Table;
-use tactus_lab::data::whole::write_whole;
 use tactus_lab::eval::report::{RUNS, Report, Slides};
 use tactus_lab::eval::samples;
 use tactus_lab::eval::show::count;
@@ -20,7 +19,7 @@ use super::learn::learned_here;
 use super::output::{Format, UsageError, percent, print_json, verdict_rows};
 use super::plot::Plot;
 use super::progress::{notice, progress};
-use super::table_file::read_table;
+use super::table_file::{Force, read_table, write_file};
 use super::textures::{measure_folder, of_one_finger};
 
 /// Say what a table is good for, or how repeatable recorded slides are by part and operator
@@ -47,9 +46,11 @@ pub(crate) struct Args {
     /// Seed of the explorations
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The page to write; a page that is there is replaced
+    /// The page to write
     #[arg(long, value_name = "FILE.html", requires = "table")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     #[command(flatten)]
     plot: Plot,
     /// How to print the report
@@ -102,7 +103,7 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
             map: map::figure(table)?.svg,
         };
         let page = render(include_str!("report/page.html"), &page)?;
-        write_whole(path, page).with_context(|| path.display().to_string())?;
+        write_file(path, page.as_bytes(), args.force)?;
     }
     match args.format {
         Format::Json => print_json(&report, out)?,

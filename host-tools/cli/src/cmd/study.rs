@@ -88,7 +88,8 @@ fn stage<T>(
 
 /// Makes a study, or a part of one, and writes its report.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    report::prepare(&args.out)?;
+    // until it is written
+    let _lock = report::prepare(&args.out)?;
     let study = study(args)?;
     report::write(&study, &args.out)?;
     match args.format {

@@ -1,17 +1,17 @@
 //! `tactus unpack`: what the command brings along, as files.
 
 use std::fs;
-use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::factory;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::eval::show::count;
 
 use super::simulate;
-use super::table_file::write_table;
+use super::table_file::{Force, write_file};
 use super::textures::collection;
 
 /// The textures of the recordings, by their numbers in Table 1, and how often each is slid over at each movement.
@@ -43,7 +43,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         .with_context(|| format!("cannot make {}", args.folder.display()))?;
     for (name, table) in factory::ALL {
         let file = args.folder.join(name);
-        write(&file, table)?;
+        let kept = write_file(&file, table, Force::default());
+        kept.context("a table of the factory; give another folder, or move it away")?;
         writeln!(out, "{}", file.display())?;
     }
     let folder = args.folder.join(RECORDINGS);
@@ -63,19 +64,4 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         count(slides as u64, "slide")
     )?;
     Ok(())
-}
-
-fn write(file: &Path, table: &[u8]) -> anyhow::Result<()> {
-    match fs::read(file) {
-        Ok(there) => {
-            ensure!(
-                there == table,
-                "{} is another table than the factory's: give another folder, or move it away",
-                file.display()
-            );
-            Ok(())
-        }
-        Err(why) if why.kind() == ErrorKind::NotFound => write_table(file, table),
-        Err(why) => Err(why).with_context(|| format!("cannot read {}", file.display())),
-    }
 }

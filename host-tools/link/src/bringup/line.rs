@@ -48,7 +48,10 @@ impl Line {
                         found = Some(answer.saw);
                     }
                 }
-                _ if decode::<Report>(&mut frame).is_ok() => self.others += 1,
+                _ if decode::<Report>(&mut frame.clone()).is_ok() => self.others += 1,
+                _ if decode::<Ask>(&mut frame).is_ok_and(|ask| ask.mark == MARK) => {
+                    return Err(Trouble::Echo);
+                }
                 _ => {}
             }
         }

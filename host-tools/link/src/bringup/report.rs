@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::journal::{Entry, Journal};
 use super::steps::STEPS;
+use crate::whole::write_whole;
 
 /// What is known of a rig.
 #[derive(Debug, Serialize)]
@@ -68,9 +69,9 @@ impl Report {
 
     /// Writes `report.txt` and, with the points of the curves, `report.json` into a folder.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
-        std::fs::write(folder.join("report.txt"), self.text())?;
+        write_whole(&folder.join("report.txt"), self.text())?;
         let mut json = serde_json::to_string_pretty(self)?;
         json.push('\n');
-        std::fs::write(folder.join("report.json"), json)
+        write_whole(&folder.join("report.json"), json)
     }
 }

@@ -5,6 +5,8 @@ use std::io;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report, Reset};
 
+use crate::LinkError;
+
 /// Why a step came to no end.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
@@ -17,6 +19,9 @@ pub enum Trouble {
              flash`), then the same command again"
     )]
     OtherImage,
+    /// What is asked comes back.
+    #[error("{}", LinkError::Echo)]
+    Echo,
     /// The board says nothing.
     #[error(
         "the self-test says nothing: flash it (cargo xtask flash --self-test), press the board's black button, then \

@@ -33,6 +33,8 @@ async fn confirm(probe: &Probe, said: String, asked: &str) -> Result<()> {
 async fn consent(probe: &Probe, lost: impl FnOnce(&Table<'_>) -> String) -> Result<()> {
     let bytes = probe.table().await?;
     let table = Table::read(&bytes)?;
+    // what `push` would not take brings nothing back
+    PushTable::new(&bytes)?;
     let backup = Backup {
         // one file for one table, however often it is kept
         name: format!("table-{:08x}.tact", table.crc()),

@@ -2,11 +2,12 @@
 //! leaves the rig lifted and stopped.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::pin::{Pin, pin};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, OnceLock};
 use std::task::Poll;
 use std::time::Duration;
 
@@ -22,6 +23,7 @@ use tactus_link::{OperationError, Port, Probe, Transaction};
 
 use super::line::{Consent, Where};
 use crate::cmd::output::Format;
+use crate::cmd::printed::{prompt as ask_for, say};
 
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BenchError {
@@ -41,6 +43,8 @@ pub(crate) enum BenchError {
     Io(#[from] io::Error),
     #[error("nothing was changed: there is nobody to ask; add --yes to do it")]
     Nobody,
+    #[error("nothing was changed: {} is there already: give --backup another name, or --force", .0.display())]
+    Taken(PathBuf),
 }
 
 impl BenchError {
@@ -125,7 +129,7 @@ impl Bench {
                 return done;
             }
             if self.interrupt.take() {
-                eprintln!("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");
+                say("\nStopping and lifting the finger (Ctrl-C again: do not wait) ...");
                 self.probe.interrupt();
             }
         }
@@ -149,7 +153,7 @@ impl Bench {
             shown.unwrap_or_else(|why| self.fails(why.into()));
         }
         if let Some(backup) = self.probe.backup() {
-            let kept = self.consent.keep(&backup.name, &backup.bytes);
+            let kept = self.consent.keep(&backup.bytes);
             let kept =
                 kept.map(|file| format!("`tactus device table push {file}` brings it back."));
             self.probe.kept(kept.map_err(|why| format!("{why:#}")));
@@ -251,9 +255,29 @@ impl Bench {
     }
 }
 
+/// Why a log did not get its name when its bench was left.
+static UNKEPT: OnceLock<io::Error> = OnceLock::new();
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        if let Some(Err(why)) = self.log.as_mut().map(Log::finish) {
+            // the first one is told
+            let _ = UNKEPT.set(why);
+        }
+    }
+}
+
+/// Checks that the logs of all benches were kept.
+pub(super) fn logs_kept() -> io::Result<()> {
+    let why = UNKEPT.get();
+    why.map_or(Ok(()), |why| {
+        Err(io::Error::new(why.kind(), why.to_string()))
+    })
+}
+
 /// Asks, and waits for a line; `None`: Ctrl-C or the end of the input.
 fn read_answer(interrupt: &Interrupt, prompt: &str) -> io::Result<Option<String>> {
-    eprint!("{prompt}");
+    ask_for(prompt);
     let (entered, enter) = mpsc::channel();
     // a blocking read does not see Ctrl-C; the thread ends with the program
     std::thread::spawn(move || {

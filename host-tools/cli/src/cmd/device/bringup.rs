@@ -17,6 +17,7 @@ use tactus_link::bringup::{
 use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
 use crate::cmd::output::Format;
+use crate::cmd::printed::{prompt as ask_for, say};
 
 /// Bring up a new rig: check its parts and wires step by step, and name what is wrong
 #[derive(clap::Args)]
@@ -71,8 +72,8 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             line: Line::default(),
             interrupt,
         };
-        eprintln!(
-            "Looking for the self-test. If nothing comes in a minute, press the board's black button."
+        say(
+            "Looking for the self-test. If nothing comes in a minute, press the board's black button.",
         );
         board
             .hello(STARTS)
@@ -84,16 +85,16 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     write!(out, "{}", report.text())?;
     out.flush()?;
     let folder = how.report.display();
-    eprintln!("The report is in {folder}: report.txt and report.json.");
+    say(format_args!(
+        "The report is in {folder}: report.txt and report.json."
+    ));
     match done.map_err(BenchError::BringUp)? {
         Ended::Passed => {
-            eprintln!(
-                "All steps have passed. Next: tactus device identify, or tactus device train"
-            );
+            say("All steps have passed. Next: tactus device identify, or tactus device train");
         }
-        Ended::Flash(_) => eprintln!(
+        Ended::Flash(_) => say(
             "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does \
-             the last steps"
+             the last steps",
         ),
         Ended::Failed => bail!("a step has not passed; the same command runs it again"),
     }
@@ -228,7 +229,7 @@ fn lines() -> Receiver<io::Result<String>> {
 
 impl Terminal {
     fn line(&mut self, prompt: &str) -> Result<String, Trouble> {
-        eprint!("  {prompt} ");
+        ask_for(format_args!("  {prompt} "));
         loop {
             if self.interrupt.take() {
                 return Err(Trouble::Quit);
@@ -237,7 +238,7 @@ impl Terminal {
                 Ok(line) => {
                     let line = line?.trim().to_owned();
                     if !io::stdin().is_terminal() {
-                        eprintln!("{line}");
+                        say(&line);
                     }
                     return if line == "q" {
                         Err(Trouble::Quit)
@@ -270,7 +271,7 @@ impl Person for Terminal {
     }
 
     fn squeeze(&mut self) -> Result<(), Trouble> {
-        eprintln!("  Squeeze the finger once between two fingers and lay it down, within 30 s.");
+        say("  Squeeze the finger once between two fingers and lay it down, within 30 s.");
         Ok(())
     }
 
@@ -284,7 +285,7 @@ impl Person for Terminal {
             let line = self.line(&format!("{question} ({choices}):"))?;
             match line.parse() {
                 Ok(n @ 1..) if n <= answers.len() => return Ok(n - 1),
-                _ => eprintln!("  a number from 1 to {}", answers.len()),
+                _ => say(format_args!("  a number from 1 to {}", answers.len())),
             }
         }
     }
@@ -294,7 +295,7 @@ impl Person for Terminal {
             let line = self.line(&format!("{question}, {unit}:"))?;
             match line.replace(',', ".").parse() {
                 Ok(number) if f64::is_finite(number) => return Ok(number),
-                _ => eprintln!("  a number of {unit}"),
+                _ => say(format_args!("  a number of {unit}")),
             }
         }
     }
@@ -303,12 +304,10 @@ impl Person for Terminal {
 impl Operator for Terminal {
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
         let verdict = if entry.passed { "passed" } else { "FAILED" };
-        eprintln!("{verdict}  {}: {}", step.checks, entry.saw);
+        say(format_args!("{verdict}  {}: {}", step.checks, entry.saw));
         for mistake in &entry.mistakes {
-            eprintln!(
-                "        {}\n        what to do: {}",
-                mistake.what, mistake.remedy
-            );
+            let (what, remedy) = (&mistake.what, &mistake.remedy);
+            say(format_args!("        {what}\n        what to do: {remedy}"));
         }
         Ok(entry.passed)
     }

@@ -106,8 +106,12 @@ impl Checks {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let mut checks = Checks::default();
-    match Bench::open(&args.at, args.format) {
-        Ok((mut bench, status)) => examine(&mut bench, &status, &mut checks)?,
+    let examined = match Bench::open(&args.at, args.format) {
+        Ok((mut bench, status)) => examine(&mut bench, &status, &mut checks),
+        Err(why) => Err(why),
+    };
+    match examined {
+        Ok(()) => {}
         Err(why) if why.is_interrupt() => return Err(why.into()),
         Err(why) => unreached(&why, &mut checks),
     }
@@ -169,7 +173,7 @@ fn examine(bench: &mut Bench, status: &Status, checks: &mut Checks) -> Result<()
     let again = Command::SetFalseAlarm(status.false_alarm);
     match bench.get(Request::command(again)) {
         Ok(()) => checks.good("store", "a setting was written again".to_owned()),
-        Err(why) if why.is_interrupt() => return Err(why),
+        Err(BenchError::Operation(why)) if why.refusal().is_none() => return Err(why.into()),
         Err(why) => {
             let remedy = "pull the table (`tactus device table pull FILE`), flash the firmware again, push the table";
             checks.bad("store", why.to_string(), remedy);
@@ -212,8 +216,8 @@ fn line(bench: &mut Bench, checks: &mut Checks) -> Result<(), BenchError> {
 
 fn acquisition(status: &Status, checks: &mut Checks) {
     let counts = &status.counts;
-    let damaged = counts.parity_errors + counts.error_frames;
-    let share = f64::from(damaged) / f64::from(counts.slots.max(1));
+    let damaged = u64::from(counts.parity_errors) + u64::from(counts.error_frames);
+    let share = damaged as f64 / f64::from(counts.slots.max(1));
     let seen = format!(
         "{}, {} damaged, {} late, {} lost",
         count(counts.slots, "word"),
@@ -225,7 +229,7 @@ fn acquisition(status: &Status, checks: &mut Checks) {
         let remedy =
             "cable, ground and supply of the sensor; `tactus device bringup` looks at each";
         checks.bad("sensor", seen, remedy);
-    } else if damaged + counts.late_slots + counts.lost_samples > 0 {
+    } else if damaged > 0 || counts.late_slots > 0 || counts.lost_samples > 0 {
         let remedy = "slides with lost words did not count; does the number grow?";
         checks.look("sensor", seen, remedy);
     } else {

@@ -3,15 +3,17 @@
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use clap::Args;
+use tactus_lab::data::recordings::files::sha256;
+use tactus_link::PushTable;
 use tactus_link::line::{Line, LineError, found, only_nucleo, open};
 use tactus_link::lock::PortLock;
 use tactus_link::operations;
 
 use super::bench::BenchError;
 use crate::cmd::args::named;
-use crate::cmd::table_file::write_table;
+use crate::cmd::table_file::{Force, is_pipe, write_file};
 
 /// Which probe.
 #[derive(Args, Clone, Debug, Default)]
@@ -51,6 +53,8 @@ pub(crate) struct Consent {
     /// Keep the probe's table in this file first, and not in ~/.local/share/tactus/backups
     #[arg(long, value_name = "FILE")]
     pub(crate) backup: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
 }
 
 impl Consent {
@@ -62,13 +66,45 @@ impl Consent {
         }
     }
 
-    pub(super) fn keep(&self, name: &str, table: &[u8]) -> anyhow::Result<String> {
-        let file = match &self.backup {
-            Some(file) => file.clone(),
-            None => folder()?.join(name),
+    /// Checks that nothing is in the place of the copy: to be known before a person has worked for it.
+    pub(crate) fn has_place(&self) -> Result<(), BenchError> {
+        match &self.backup {
+            Some(file) if !self.force.force && file.exists() => {
+                Err(BenchError::Taken(file.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Keeps a table in a file that `table push` takes; one of this name that holds something else stays as it is.
+    pub(super) fn keep(&self, table: &[u8]) -> anyhow::Result<String> {
+        let (file, force) = match &self.backup {
+            Some(file) => (file.clone(), self.force),
+            // one file for one table, however often it is kept
+            None => {
+                let name = format!("table-{}.tact", sha256(table));
+                (folder()?.join(name), Force::default())
+            }
         };
-        write_table(&file, table)?;
-        Ok(file.display().to_string())
+        let name = file.display().to_string();
+        ensure!(
+            !is_pipe(&file),
+            "--backup: name a file, which can be read again"
+        );
+        write_file(&file, table, force)?;
+        let kept = std::fs::metadata(&file).is_ok_and(|kept| kept.is_file());
+        let kept = if kept {
+            std::fs::read(&file)
+        } else {
+            Ok(Vec::new())
+        };
+        let kept = kept.with_context(|| name.clone())?;
+        ensure!(
+            kept == table,
+            "{name}: does not hold what was written; name another file with --backup"
+        );
+        PushTable::new(&kept).with_context(|| name.clone())?;
+        Ok(name)
     }
 }
 

@@ -8,6 +8,7 @@ mod view;
 
 use std::io::{self, IsTerminal as _};
 use std::pin::Pin;
+use std::sync::mpsc::{self, Receiver};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
@@ -22,12 +23,15 @@ use self::state::{Monitor, Weight};
 use super::bench::{Bench, BenchError};
 use super::identify::Args;
 use crate::cmd::output::Format;
+use crate::cmd::say;
 
 /// How often the screen is drawn, and the probe asked how it is.
 const DRAWN: Duration = Duration::from_millis(100);
 const ASKED: Duration = Duration::from_secs(1);
 /// The monitor asks for the status every second, and shows a probe as silent that says nothing for so long.
 const SILENT: Duration = Duration::from_secs(3);
+/// A probe that says nothing for so long is gone.
+const GONE: Duration = Duration::from_secs(60);
 
 /// The keys, in a word each.
 const KEYS: [(&str, &str); 4] = [
@@ -85,7 +89,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     // whatever happens, a panic too, the terminal is given back as it was
     let mut terminal = ratatui::try_init()?;
     let ended = watch(&mut bench, &mut monitor, &mut terminal, &wanted);
-    ratatui::restore();
+    // it may be gone
+    let _ = ratatui::try_restore();
     let end = match ended {
         Ok(end) => end,
         Err(why @ BenchError::Operation(OperationError::Port { .. })) => return Err(why.into()),
@@ -95,10 +100,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             return Err(why.into());
         }
     };
-    eprintln!("Stopping and lifting the finger (Ctrl-C: do not wait) ...");
+    say("Stopping and lifting the finger (Ctrl-C: do not wait) ...");
     match (bench.lift()?, end) {
         (Stopped::Lifted, End::Quit) => {
-            eprintln!("Stopped: the finger is lifted and the stage stands.");
+            say("Stopped: the finger is lifted and the stage stands.");
             Ok(())
         }
         (came, _) => Err(BenchError::Operation(came.into()).into()),
@@ -117,9 +122,10 @@ fn watch(
     let mut asked: Option<Instant> = None;
     let mut heard = Instant::now();
     let probe = bench.probe.clone();
+    let keys = keys();
     probe.send(Command::Stream(true))?;
     loop {
-        if bench.interrupt.take() || is_gone(&io::stdin()) {
+        if bench.interrupt.take() || is_gone(&io::stdout()) {
             return Ok(End::Interrupt);
         }
         let mut hear = |report: &Report| {
@@ -160,16 +166,19 @@ fn watch(
             asked = Some(Instant::now());
             probe.send(Command::Status)?;
         }
-        monitor.silent = Some(heard.elapsed()).filter(|silent| *silent >= SILENT);
+        let silent = heard.elapsed();
+        if silent >= GONE {
+            let (name, why, moving) = (bench.name.clone(), PortError::Silent(GONE), false);
+            return Err(OperationError::Port { name, why, moving }.into());
+        }
+        monitor.silent = Some(silent).filter(|silent| *silent >= SILENT);
         monitor.losses = probe.losses();
         if drawn.is_none_or(|at| at.elapsed() >= DRAWN) {
             drawn = Some(Instant::now());
             terminal.draw(|frame| view::draw(monitor, frame))?;
         }
-        while event::poll(Duration::ZERO)? {
-            let Some(key) = event::read()?.as_key_press_event() else {
-                continue;
-            };
+        for key in keys.try_iter() {
+            let key = key?;
             if let Some(end) = end_of(key) {
                 return Ok(end);
             }
@@ -193,7 +202,22 @@ fn watch(
     }
 }
 
-/// Whether the terminal has been closed: crossterm would read its end for ever.
+/// Keys, read in a thread of their own: where the terminal is gone, crossterm reads its end for ever.
+fn keys() -> Receiver<io::Result<KeyEvent>> {
+    let (pressed, keys) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut goes_on = true;
+        while goes_on {
+            let read = event::read();
+            goes_on = read.is_ok();
+            let key = read.map(|event| event.as_key_press_event()).transpose();
+            goes_on &= key.is_none_or(|key| pressed.send(key).is_ok());
+        }
+    });
+    keys
+}
+
+/// Whether the terminal has been closed.
 #[cfg(unix)]
 fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -203,7 +227,7 @@ fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
 }
 
 #[cfg(not(unix))]
-fn is_gone(_: &io::Stdin) -> bool {
+fn is_gone(_: &io::Stdout) -> bool {
     false
 }
 

@@ -140,6 +140,7 @@ pub(crate) fn forget(args: &Forget, out: &mut impl Write) -> anyhow::Result<()> 
 pub(crate) fn refresh(args: &Refresh, out: &mut impl Write) -> anyhow::Result<()> {
     let (mut bench, _) = Bench::open(&args.at, Format::Text)?;
     args.consent.can_be_given()?;
+    args.consent.has_place()?;
     bench.consent = args.consent.clone();
     let probe = bench.probe.clone();
     let seed = || args.seed.unwrap_or_else(seed_of_now);

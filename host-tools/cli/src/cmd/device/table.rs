@@ -12,7 +12,7 @@ use tactus_link::operations;
 use super::bench::Bench;
 use super::line::{Consent, Where};
 use crate::cmd::output::{Format, print_json};
-use crate::cmd::table_file::{beside, read_table, write_table};
+use crate::cmd::table_file::{Force, beside, read_table, write_file};
 
 /// Show, fetch or replace the probe's texture table
 #[derive(Subcommand)]
@@ -38,6 +38,8 @@ pub(crate) enum Command {
         at: Where,
         /// The file to write; "-": standard output
         file: PathBuf,
+        #[command(flatten)]
+        force: Force,
     },
     /// Check a table, send it to the probe, and compare what the probe uses then
     Push {
@@ -73,9 +75,9 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
             writeln!(out, "The table {whose}.")?;
             show_table(Table::read(&bytes)?, out)?;
         }
-        Command::Pull { at, file } => {
+        Command::Pull { at, file, force } => {
             let bytes = Bench::open(at, Format::Text)?.0.table()?;
-            write_table(file, &bytes)?;
+            write_file(file, &bytes, *force)?;
             let table = Table::read(&bytes)?;
             let textures = count(table.textures(), "texture");
             let (name, length, crc) = (file.display(), bytes.len(), table.crc());

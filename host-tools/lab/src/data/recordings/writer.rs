@@ -2,12 +2,14 @@
 //!
 //! Files of samples come first, then the slide's row, in `manifest.csv.part`, which becomes the manifest when all is
 //! there. Beside it lies [`INCOMPLETE`], which names the recording in progress: the same command continues after any
-//! interruption, and no other one writes into the folder.
+//! interruption, and no other one writes into the folder. A lock keeps a second command out meanwhile.
 
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
+
+use tactus_core::sensor::FingerCode;
 
 use super::files::{
     BIOTAC_MANIFEST, INCOMPLETE, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,
@@ -17,9 +19,10 @@ use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
-use tactus_core::sensor::FingerCode;
+use crate::data::whole::{Lock, sync_folder};
 
 const ROWS: &str = "manifest.csv.part";
+const LOCK: &str = "INCOMPLETE.lock";
 /// Columns of [`COLUMNS`]: texture, name, slide; and of files, each followed by or before its hash.
 const KEY: [usize; 3] = [0, 1, 2];
 const FILES: [(usize, usize); 4] = [(8, 9), (10, 12), (13, 15), (16, 18)];
@@ -35,22 +38,46 @@ pub struct RecordingWriter {
     journal: File,
     /// the folder was not there before
     made: bool,
+    /// no other command writes into the folder
+    lock: Option<Lock>,
 }
 
 impl RecordingWriter {
     /// Starts the recordings of `textures` in `folder`, which is made if it is not there, or continues the unfinished
     /// ones of the same `command`: [`has`](Self::has) returns the slides that are there.
     /// Errors: if the folder cannot be made, or holds recordings, or unfinished ones of another command, or other
-    /// files; or two textures have one number.
+    /// files, or another command writes into it now; or two textures have one number.
     pub fn begin(folder: &Path, textures: Vec<Texture>, command: &str) -> Result<Self> {
-        let note = note(command);
+        let made = !folder.exists();
+        let begun = Self::begin_in(folder, made, textures, &note(command));
+        if made && begun.is_err() {
+            // nothing else is in it
+            let _ = fs::remove_file(folder.join(INCOMPLETE));
+            let _ = fs::remove_dir(folder);
+        }
+        begun
+    }
+
+    fn begin_in(folder: &Path, made: bool, textures: Vec<Texture>, note: &str) -> Result<Self> {
+        distinct_textures(&folder.join(MANIFEST), &textures)?;
+        fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
+        let lock = Lock::take(&folder.join(LOCK)).map_err(|why| match why.kind() {
+            ErrorKind::ResourceBusy => {
+                let cause = "another command writes recordings here now: wait for that one, or give another folder";
+                RecordingError::at(folder, cause)
+            }
+            _ => io_error(folder, why),
+        })?;
         // the last moment of a command that ended after all was whole
-        if folder.join(MANIFEST).exists() && read_note(folder)? == Some(note.clone()) {
+        if folder.join(MANIFEST).exists() && read_note(folder)?.as_deref() == Some(note) {
             drop(fs::remove_file(folder.join(INCOMPLETE)));
             return Err(taken(folder, MANIFEST));
         }
-        let made = !folder.exists();
-        Self::check(folder, &textures)?;
+        for manifest in [MANIFEST, BIOTAC_MANIFEST] {
+            if folder.join(manifest).exists() {
+                return Err(taken(folder, manifest));
+            }
+        }
         let rows = match read_note(folder)? {
             Some(there) if there == note => rows_there(folder, &textures)?,
             // it had not come to its first slide
@@ -72,6 +99,7 @@ impl RecordingWriter {
             rows,
             keys,
             made,
+            lock: Some(lock),
         })
     }
 
@@ -84,17 +112,6 @@ impl RecordingWriter {
     /// Gives these labels to the slides to come.
     pub fn label(&mut self, labels: Labels) {
         self.labels = labels;
-    }
-
-    fn check(folder: &Path, textures: &[Texture]) -> Result<()> {
-        distinct_textures(&folder.join(MANIFEST), textures)?;
-        fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
-        for manifest in [MANIFEST, BIOTAC_MANIFEST] {
-            if folder.join(manifest).exists() {
-                return Err(taken(folder, manifest));
-            }
-        }
-        Ok(())
     }
 
     /// Number of slides of a texture that are there.
@@ -160,10 +177,24 @@ impl RecordingWriter {
                 return Err(RecordingError::empty_texture(&manifest, texture));
             }
         }
+        for name in self
+            .rows
+            .iter()
+            .flat_map(|row| FILES.map(|(file, _)| &row[file]))
+        {
+            // of a stream that was not measured there is none
+            if name.is_empty() {
+                continue;
+            }
+            let path = self.folder.join(name);
+            let kept = File::open(&path).and_then(|file| file.sync_all());
+            kept.map_err(|e| io_error(&path, e))?;
+        }
         self.journal
             .sync_all()
             .and_then(|()| fs::rename(self.folder.join(ROWS), &manifest))
             .map_err(|e| io_error(&manifest, e))?;
+        sync_folder(&manifest);
         let note = self.folder.join(INCOMPLETE);
         fs::remove_file(&note).map_err(|e| io_error(&note, e))
     }
@@ -174,7 +205,7 @@ impl Drop for RecordingWriter {
     fn drop(&mut self) {
         let is_ours = |entry: std::io::Result<fs::DirEntry>| {
             entry.is_ok_and(|entry| {
-                [ROWS, INCOMPLETE, PART]
+                [ROWS, INCOMPLETE, PART, LOCK]
                     .map(Into::into)
                     .contains(&entry.file_name())
             })
@@ -184,6 +215,7 @@ impl Drop for RecordingWriter {
             // they may be gone already
             let _ = fs::remove_file(self.folder.join(ROWS));
             let _ = fs::remove_file(self.folder.join(INCOMPLETE));
+            self.lock = None;
             if self.made {
                 let _ = fs::remove_dir(&self.folder);
             }
@@ -298,7 +330,8 @@ fn read_note(folder: &Path) -> Result<Option<String>> {
 fn is_empty(folder: &Path) -> Result<bool> {
     let mut names = fs::read_dir(folder).map_err(|e| io_error(folder, e))?;
     // a command that ended when it had only begun leaves a part of its note
-    Ok(names.all(|entry| entry.is_ok_and(|entry| entry.file_name() == PART)))
+    let is_ours = |name: std::ffi::OsString| name == PART || name == LOCK;
+    Ok(names.all(|entry| entry.is_ok_and(|entry| is_ours(entry.file_name()))))
 }
 
 fn header() -> Vec<String> {
@@ -382,9 +415,11 @@ const PART: &str = "INCOMPLETE.part";
 /// Writes a file of the folder, whole or not at all.
 fn replace(folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
     let (part, path) = (folder.join(PART), folder.join(name));
-    fs::write(&part, bytes)
-        .and_then(|()| fs::rename(&part, &path))
-        .map_err(|e| io_error(&path, e))
+    let replaced = fs::write(&part, bytes).and_then(|()| fs::rename(&part, &path));
+    replaced.map_err(|e| {
+        let _ = fs::remove_file(&part);
+        io_error(&path, e)
+    })
 }
 
 fn thousandths(value: u32) -> String {

@@ -1,0 +1,54 @@
+//! Standard output and error. A reader that leaves ends the printing, not the work: its exit code stays that of what
+//! was found.
+
+use std::fmt::Display;
+use std::io::{self, ErrorKind, Write};
+
+/// Standard output.
+pub(crate) struct Printed(pub(crate) io::Stdout);
+
+impl Write for Printed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        unless_left(self.0.write(bytes), bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        unless_left(self.0.flush(), ())
+    }
+}
+
+fn unless_left<T>(done: io::Result<T>, all: T) -> io::Result<T> {
+    match done {
+        Err(why) if why.kind() == ErrorKind::BrokenPipe => Ok(all),
+        Err(why) if why.kind() == ErrorKind::Interrupted => Err(why),
+        Err(why) => {
+            let said = format!("standard output takes no more ({why}): give it another place");
+            Err(io::Error::new(why.kind(), said))
+        }
+        Ok(done) => Ok(done),
+    }
+}
+
+/// Standard error. What it does not take is not said: nobody is there.
+pub(crate) struct Beside;
+
+impl Write for Beside {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let _ = io::stderr().write_all(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Says something on standard error, on a line of its own.
+pub(crate) fn say(what: impl Display) {
+    let _ = writeln!(Beside, "{what}");
+}
+
+/// Says what somebody is to enter behind it.
+pub(crate) fn prompt(what: impl Display) {
+    let _ = write!(Beside, "{what}");
+}

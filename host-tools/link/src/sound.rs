@@ -1,0 +1,139 @@
+//! Reports that no probe makes: they pass the checksum, and nothing of them is believed or shown.
+
+use tactus_core::table::{MAX_MOVEMENTS, MAX_TEXTURES, is_false_alarm};
+use tactus_core::wire::{Event, ExpectedOutcome, PART, SlideReport, Status, Verdict};
+
+/// Longest table, bytes: more than any chip has flash for.
+const MAX_TABLE: u32 = 1 << 20;
+/// Rounding of probabilities and of what is computed from them.
+const ROUNDING: f32 = 1e-3;
+
+/// Finds what cannot be in a report; `None`: all can.
+pub(crate) fn impossible(event: &Event) -> Option<&'static str> {
+    let all = |good: bool, what: &'static str| (!good).then_some(what);
+    match event {
+        Event::Booted {
+            version,
+            last_words,
+            ..
+        } => {
+            let words = last_words.as_ref().map_or("", |words| words.as_str());
+            all(is_printable(version) && is_printable(words), TEXT)
+        }
+        Event::Status(status) => of_status(status),
+        Event::Refused { why, .. } | Event::Rejected { why, .. } | Event::Trouble(why) => {
+            all(is_printable(&why.to_string()), TEXT)
+        }
+        Event::Chosen {
+            slide,
+            action,
+            expected,
+            ..
+        } => {
+            let can_be = |o: &ExpectedOutcome| is_share(o.uncertainty) && o.benefit.is_finite();
+            let is_movement = usize::from(action.movement) < MAX_MOVEMENTS;
+            all(*slide > 0 && is_movement, COUNT)
+                .or_else(|| all(expected.iter().all(can_be), NUMBER))
+        }
+        Event::SlideReport {
+            slide,
+            observed,
+            posterior,
+            ..
+        } => {
+            let shares = posterior.iter().all(|p| is_share(*p));
+            all(shares && is_share(posterior.iter().sum()), PROBABILITY)
+                .or_else(|| all(*slide > 0, COUNT))
+                .or_else(|| all(is_measured(observed), NUMBER))
+        }
+        Event::Verdict(verdict) => of_verdict(verdict),
+        Event::TextureLearned(learned) => all(is_name(&learned.name), TEXT),
+        Event::TrainingSlide {
+            trial, observed, ..
+        } => all(*trial > 0, COUNT).or_else(|| all(is_measured(observed), NUMBER)),
+        Event::Block(block) => all(block.steady.is_none_or(|(from, to)| from <= to), COUNT),
+        Event::TablePart {
+            offset,
+            length,
+            bytes,
+        } => {
+            let end = u64::from(*offset) + bytes.len() as u64;
+            let is_part = bytes.len() == PART || end == u64::from(*length);
+            let is_table = *length <= MAX_TABLE && end <= u64::from(*length);
+            all(is_part && is_table, "a part of no table")
+        }
+        Event::Weighed { counts, .. } => all(counts.is_finite(), NUMBER),
+        Event::Verified { now, .. } => all(!now.score.is_nan() && !now.limit.is_nan(), NUMBER),
+        Event::Turned {
+            g_counts,
+            offset_counts,
+        } => all(g_counts.is_finite() && offset_counts.is_finite(), NUMBER),
+        _ => None,
+    }
+}
+
+pub(crate) const TEXT: &str = "a text with characters that do not print";
+const COUNT: &str = "a count out of its range";
+const DAY: &str = "a day of no calendar";
+const NUMBER: &str = "a number out of its range";
+const PROBABILITY: &str = "a probability outside 0 to 1";
+
+fn of_status(status: &Status) -> Option<&'static str> {
+    let (month, day) = (status.calibrated / 100 % 100, status.calibrated % 100);
+    let is_day = (2000..2200).contains(&(status.calibrated / 10_000))
+        && (1..=12).contains(&month)
+        && (1..=31).contains(&day);
+    let fits = usize::from(status.textures) <= MAX_TEXTURES && status.table_bytes <= MAX_TABLE;
+    if !fits {
+        Some(COUNT)
+    } else if status.calibrated > 1 && !is_day {
+        Some(DAY)
+    } else {
+        let good = status.false_alarm.is_none_or(is_false_alarm);
+        (!good).then_some(PROBABILITY)
+    }
+}
+
+fn of_verdict(verdict: &Verdict) -> Option<&'static str> {
+    if !is_share(verdict.probability) {
+        Some(PROBABILITY)
+    } else if !is_name(&verdict.name) {
+        Some(TEXT)
+    } else if usize::from(verdict.texture) >= MAX_TEXTURES {
+        Some(COUNT)
+    } else {
+        let good = verdict.log_odds.is_none_or(f32::is_finite);
+        (!good).then_some(NUMBER)
+    }
+}
+
+fn is_share(share: f32) -> bool {
+    (-ROUNDING..=1.0 + ROUNDING).contains(&share)
+}
+
+fn is_measured(observed: &SlideReport) -> bool {
+    let properties = observed.properties.iter().flatten();
+    properties.copied().all(f32::is_finite)
+        && observed.background.is_finite()
+        && observed.background >= 0.0
+}
+
+fn is_name(name: &str) -> bool {
+    !name.trim().is_empty() && is_printable(name)
+}
+
+/// Returns true if no character of a text controls a terminal, or the order of those around it.
+pub(crate) fn is_printable(text: &str) -> bool {
+    let hides = |c: char| {
+        let marks = '\u{200b}'..='\u{200f}';
+        let orders = '\u{2028}'..='\u{202e}';
+        let isolates = '\u{2060}'..='\u{2069}';
+        c.is_control()
+            || c == '\u{61c}'
+            || c == '\u{feff}'
+            || [marks, orders, isolates]
+                .iter()
+                .any(|range| range.contains(&c))
+    };
+    !text.chars().any(hides)
+}
