@@ -14,7 +14,7 @@
 //! | 1 | contents, 0: Gaussians, 1: fused |
 //! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
-//! | 2 | number of textures T |
+//! | 2 | number of textures T, [`MAX_TEXTURES`] at most |
 //! | 1 | number of movements M |
 //! | 1 | Gaussians: 0; fused: number of features d |
 //! | 6 M | per movement: force in mN (2), speed in um/s (4) |
@@ -24,7 +24,7 @@
 //! | T M | per texture and movement: number of trials, 255 for more |
 //! | 4 | CRC-32 of the table that this one was made from by learning, the first of all; 0 for none |
 //! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
-//! | | per texture: length of its name (1), the name in UTF-8 |
+//! | | per texture: length of its name (1), the name in UTF-8: see [`valid_name`] |
 //! | | sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
 //!
@@ -66,6 +66,7 @@ mod gaussian;
 mod lengths;
 mod limits;
 mod matrix;
+mod name;
 mod patch;
 mod population;
 mod samples;
@@ -82,12 +83,13 @@ pub use encode::{
 };
 pub use finger::{FINGER_LENGTH, with_finger};
 pub use format::{
-    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, Name, TableError, Tally, VERSION,
+    Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, TableError, Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
 pub use lengths::{MAX_LENGTHS, Shorter, with_lengths};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
+pub use name::{MAX_NAME, Name, NameError, is_printable, valid_name};
 pub use patch::{recentre, retell};
 pub use population::{POPULATION, Population};
 pub use samples::with_moved;

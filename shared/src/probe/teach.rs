@@ -64,7 +64,7 @@ pub(crate) async fn learn_by_itself<F: NorFlash>(
     store: &mut Store<F>,
     buffer: &mut [u8],
 ) -> Result<Option<Event>, MemoryError> {
-    let table = Table::read(buffer)?;
+    let table = Table::read_first(buffer)?;
     if !episode.certain || episode.table != table.crc() {
         return Ok(None);
     }
@@ -158,7 +158,7 @@ pub async fn label<F: NorFlash>(
     store: &mut Store<F>,
     buffer: &mut [u8],
 ) -> Result<Event, MemoryError> {
-    let in_force = Table::read(buffer)?.crc();
+    let in_force = Table::read_first(buffer)?.crc();
     if episode.table != in_force {
         return Err(MemoryError::TableChanged);
     }

@@ -146,12 +146,6 @@ impl<F: NorFlash> Store<F> {
         self.slots.push = None;
         let start = slot.start::<F>();
         let table = self.read_back(start + TABLE_AT, length, buffer).await?;
-        if table.as_bytes().len() != length {
-            return Err(StoreError::Unfinished {
-                got: length,
-                wanted: table.as_bytes().len(),
-            });
-        }
         let finger = finger.unwrap_or(table.finger());
         let table = table.of_finger(finger).map_err(StoreError::Table)?;
         let stored = StoredTable {

@@ -219,7 +219,7 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
         store.write_table(0, &longer).await.unwrap();
         assert!(matches!(
             store.commit_table(None, &mut buffer).await,
-            Err(StoreError::Unfinished { .. })
+            Err(StoreError::Table(TableError::Behind(1)))
         ));
     });
     assert_eq!(used(&mut store), Some(new.clone()));

@@ -9,6 +9,7 @@ use super::format::{
     TableError, Tally, VERSION, each,
 };
 use super::gaussian::{SD_LEAST, SD_STEP, mean_step};
+use super::name::MAX_NAME;
 use super::sections::Sections;
 use super::training_stats::{Experience, Whitened};
 use super::view::Table;
@@ -55,7 +56,7 @@ pub enum EncodeError {
     NoSpace(usize),
     #[error("texture {} was not learned at every movement", .0 + 1)]
     Movements(u16),
-    #[error("the name of texture {} is longer than 255 bytes", .0 + 1)]
+    #[error("the name of texture {} is longer than {MAX_NAME} bytes: shorten it", .0 + 1)]
     Name(u16),
     /// A mean that the fixed point cannot hold.
     #[error(fmt = range)]
@@ -64,7 +65,7 @@ pub enum EncodeError {
         action: Action,
         mean: f32,
     },
-    /// The written table is invalid: a name is empty or there twice, or a movement is.
+    /// The written table is invalid: a name is none or there twice, or a movement is.
     #[error(transparent)]
     Invalid(TableError),
 }
@@ -96,8 +97,8 @@ pub const fn encoded_len(
     contents.layout(textures, movements).names + names + CRC_BYTES
 }
 
-/// Writes a table of Gaussians into `out` and reads it back: every texture with its name, of 1 to 255 bytes and unlike
-/// every other, and what was learned of it, movement by movement. Means are rounded to [`mean_step`], standard
+/// Writes a table of Gaussians into `out` and reads it back: every texture with its name, valid and unlike every
+/// other, and what was learned of it, movement by movement. Means are rounded to [`mean_step`], standard
 /// deviations to [`SD_STEP`] and kept between [`SD_LEAST`] and 4. Errors: parts of `out` may have been written then.
 pub fn encode<'o, 'a>(
     out: &'o mut [u8],
@@ -430,7 +431,9 @@ fn write<'o, 'a, 'w>(
         writer.put(&[factory, user, itself]);
     }
     for (row, index) in rows.zip(0..) {
-        writer.put(&[u8::try_from(row.name.len()).map_err(|_| EncodeError::Name(index))?]);
+        let length = u8::try_from(row.name.len()).ok();
+        let length = length.filter(|length| usize::from(*length) <= MAX_NAME);
+        writer.put(&[length.ok_or(EncodeError::Name(index))?]);
         writer.put(row.name.as_bytes());
     }
     sections(&mut writer)?;

@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use heapless::String;
 use serde::{Deserialize, Serialize};
 
+use super::name::NameError;
 use super::whitening::Whitening;
 use crate::features::{FeatureSet, MovementError, Property, PropertySet};
 use crate::sensor::FingerCode;
@@ -30,11 +30,8 @@ pub(super) const CRC_BYTES: usize = 4;
 pub const MAX_MOVEMENTS: usize = 36;
 /// Most actions of a table.
 pub const MAX_ACTIONS: usize = MAX_MOVEMENTS * PROPERTIES;
-/// Most textures of a probe's table.
+/// Most textures of a table.
 pub const MAX_TEXTURES: usize = 128;
-
-/// Name of a texture.
-pub type Name = String<40>;
 
 /// The next action of an exploration: one of the table's movements, and the property to look at, or all features of the
 /// slide.
@@ -117,7 +114,7 @@ pub enum TableError {
     Deviation { texture: u16, action: Action },
     #[error("the whitening of movement {} is damaged", .0 + 1)]
     Whitening(u8),
-    #[error("the name of texture {} is empty, not UTF-8, or another's as well", .0 + 1)]
+    #[error("the name of texture {} is not UTF-8, or another's as well", .0 + 1)]
     Name(u16),
     #[error("texture {} has another's number", .0 + 1)]
     Number(u16),
@@ -134,6 +131,12 @@ pub enum TableError {
         table: FingerCode,
         probe: FingerCode,
     },
+    #[error("the name of texture {} {}", .0 + 1, .1)]
+    Unnamed(u16, NameError),
+    #[error("{0} textures, and a table has {MAX_TEXTURES} at most: learn fewer")]
+    Textures(u16),
+    #[error("{0} bytes follow the end of the table: take them off, or copy the table again")]
+    Behind(usize),
 }
 
 fn damaged(kind: &u16, f: &mut fmt::Formatter<'_>) -> fmt::Result {

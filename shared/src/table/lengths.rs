@@ -117,6 +117,9 @@ impl<'a> Table<'a> {
             if kind != LENGTH {
                 continue;
             }
+            if count == MAX_LENGTHS {
+                return None;
+            }
             let length = self.length_of(contents)?;
             let same = |from, to| length.table.bytes.get(from..to) == self.bytes.get(from..to);
             let (cut, _) = length
@@ -137,7 +140,7 @@ impl<'a> Table<'a> {
             longest = length.ms;
             count += 1;
         }
-        (count <= MAX_LENGTHS).then_some(count)
+        Some(count)
     }
 
     /// The offsets of the trials of each length among the bytes of the table.

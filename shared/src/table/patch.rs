@@ -23,7 +23,7 @@ pub fn retell(
     whitened: &Whitened,
     tally: Tally,
 ) -> Result<(), EncodeError> {
-    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let table = Table::read_first(bytes).map_err(EncodeError::Invalid)?;
     let Contents::Fused(_, features) = table.contents else {
         return Err(EncodeError::Contents);
     };

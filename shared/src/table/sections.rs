@@ -4,7 +4,8 @@ use heapless::Vec;
 
 use super::drift::{Drift, Drifts};
 use super::encode::{EncodeError, Writer};
-use super::format::{DRIFT, LENGTH, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
+use super::finger::FINGER_LENGTH;
+use super::format::{DRIFT, HEAD, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
 use super::limits::{Limits, Numbers};
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
@@ -15,6 +16,8 @@ use crate::features::MAX_FEATURES;
 pub(super) const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
 pub(super) const FINGER: u16 = 5;
+/// Most sections, of unknown kinds as well: whoever looks for one passes the others.
+const MAX_SECTIONS: usize = 32;
 
 /// The parts of a fused table beside textures.
 #[derive(Clone, Copy, Debug)]
@@ -73,11 +76,7 @@ pub(crate) struct PopulationView<'t> {
 impl<'a> Table<'a> {
     /// Returns how much drift the table was made for; `None` for a table of Gaussians.
     pub fn drift(&self) -> Option<Drift> {
-        let section = self.section(DRIFT)?;
-        Some(Drift {
-            bands: f32::from_le_bytes(array(section, 0)?),
-            traction: f32::from_le_bytes(array(section, 4)?),
-        })
+        drift_of(self.section(DRIFT)?)
     }
 
     pub(crate) fn drifts(&self, movement: u8) -> Option<Numbers<'a>> {
@@ -132,38 +131,41 @@ impl<'a> Table<'a> {
 
     pub(super) fn check_sections(&self) -> Result<(), TableError> {
         let (features, movements) = (self.features(), usize::from(self.movements));
-        let mut seen = [false; 3];
-        for section in each(self.sections) {
-            let (kind, contents) = section.ok_or(TableError::Sections)?;
+        let mut seen = 0_u8;
+        for (section, count) in each(self.sections).zip(0..) {
+            let (kind, contents) = section
+                .filter(|_| count < MAX_SECTIONS)
+                .ok_or(TableError::Sections)?;
             let fits = match kind {
-                DRIFT => {
-                    are_drifts(contents, features, movements)
-                        && self.drift().is_some_and(Drift::is_possible)
-                }
+                DRIFT => are_drifts(contents, features, movements),
                 NOVELTY => are_limits(contents, features, movements),
-                LENGTH => continue,
                 SLOPES => slopes::are_slopes(contents, features, self.textures.into(), movements),
+                FINGER => contents.len() == FINGER_LENGTH - HEAD,
                 _ => continue,
             };
-            let first = seen.get_mut(match kind {
-                DRIFT => 0,
-                NOVELTY => 1,
-                _ => 2,
-            });
-            let again = first.is_none_or(|seen| core::mem::replace(seen, true));
-            if features == 0 || again || !fits {
+            let bit = 1 << kind;
+            if seen & bit != 0 || !fits || (features == 0 && kind != FINGER) {
                 return Err(TableError::Section(kind));
             }
+            seen |= bit;
         }
         Ok(())
     }
 }
 
+fn drift_of(section: &[u8]) -> Option<Drift> {
+    Some(Drift {
+        bands: f32::from_le_bytes(array(section, 0)?),
+        traction: f32::from_le_bytes(array(section, 4)?),
+    })
+}
+
 #[inline(always)]
 pub(super) fn are_drifts(contents: &[u8], features: usize, movements: usize) -> bool {
-    let rest = contents.get(TWO..).unwrap_or_default();
+    let (drift, rest) = contents.split_at_checked(TWO).unwrap_or_default();
     let mut variances = rest.chunks(of_drift(features).max(1));
     rest.len() == movements * of_drift(features)
+        && drift_of(drift).is_some_and(Drift::is_possible)
         && variances.all(|v| Numbers::new(v).are_variances(0.0))
 }
 

@@ -2,6 +2,7 @@
 
 mod damage;
 mod fused;
+mod hostile;
 mod learning;
 mod lengths;
 mod samples;
@@ -270,10 +271,11 @@ fn outside_the_table_there_is_nothing() {
 }
 
 #[test]
-fn bytes_behind_the_table_are_left_alone() {
+fn bytes_behind_the_table_are_refused_or_left_alone() {
     let mut bytes = small();
     bytes.extend([0x5a; 40]);
-    let table = Table::read(&bytes).unwrap();
+    assert_eq!(error(&bytes), TableError::Behind(40));
+    let table = Table::read_first(&bytes).unwrap();
     assert_eq!(table.as_bytes(), small());
     assert_eq!(table.names().count(), 2);
 
@@ -326,7 +328,7 @@ fn any_table() -> impl Strategy<Value = Learned> {
     let movements = proptest::sample::subsequence(Movement::grid().collect::<Vec<_>>(), 1..=36);
     (
         movements,
-        proptest::collection::btree_set("[a-zäß語 ]{1,20}", 1..6),
+        proptest::collection::btree_set("[a-zäß語][a-zäß語 ]{0,12}", 1..6),
     )
         .prop_flat_map(|(movements, names)| {
             let scale = proptest::sample::select(vec![1e-6f32, 0.01, 0.3, 6.0]);
@@ -427,9 +429,10 @@ proptest! {
 #[test]
 fn what_cannot_be_written_is_refused() {
     let one = learned(&[[1.0, 2.0, 3.0]]);
-    let long = "x".repeat(256);
+    let long = "x".repeat(41);
     let two = || vec![one; 2];
     let name = |index| EncodeError::Invalid(TableError::Name(index));
+    let unnamed = |index, why| EncodeError::Invalid(TableError::Unnamed(index, why));
     for (textures, why) in [
         (vec![], EncodeError::Empty),
         (
@@ -439,13 +442,17 @@ fn what_cannot_be_written_is_refused() {
         (vec![("felt", vec![])], EncodeError::Movements(0)),
         (vec![("felt", vec![one; 3])], EncodeError::Movements(0)),
         (vec![("felt", two()), (&long, two())], EncodeError::Name(1)),
-        (vec![("", two())], name(0)),
+        (vec![("", two())], unnamed(0, NameError::Empty)),
+        (
+            vec![("felt", two()), ("a\u{202e}b", two())],
+            unnamed(1, NameError::Unprintable(0x202e)),
+        ),
         (vec![("felt", two()), ("felt", two())], name(1)),
     ] {
         assert_eq!(encoded(&textures), Err(why));
     }
-    let bytes = encoded(&[(&long[..255], two())]).unwrap();
-    assert_eq!(Table::read(&bytes).unwrap().name(0), Some(&long[..255]));
+    let bytes = encoded(&[(&long[..40], two())]).unwrap();
+    assert_eq!(Table::read(&bytes).unwrap().name(0), Some(&long[..40]));
 
     let write = |out: &mut [u8], measured, movements: &[Movement]| {
         let experience = vec![one; movements.len()];

@@ -1,10 +1,13 @@
 //! Reading a table where it is stored.
 
+use heapless::Vec;
+
 use super::format::{
     Action, CELL_BYTES, CRC_BYTES, Contents, DRIFT, HEADER, LABEL_BYTES, LENGTH, Layout, MAGIC,
-    MAX_MOVEMENTS, MOVEMENT_BYTES, MS, TWO, TableError, Tally, VERSION, array, each,
+    MAX_MOVEMENTS, MAX_TEXTURES, MOVEMENT_BYTES, MS, TWO, TableError, Tally, VERSION, array, each,
 };
-use super::gaussian::{Gaussian, Gaussians, mean_step};
+use super::gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
+use super::name::valid_name;
 use super::training_stats::Whitened;
 use super::whitening::{Column, View, Whitening};
 use crate::CRC32;
@@ -38,10 +41,18 @@ pub(super) struct Length<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Checks the table at the beginning of `bytes` and borrows it; what follows it is left alone.
-    /// Errors: the first check that failed.
-    #[inline]
+    /// Checks a table of which these are all bytes, and borrows it. None takes long: textures are counted before
+    /// they are compared. Errors: the first check that failed.
     pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let table = Self::read_first(bytes)?;
+        match bytes.len() - table.bytes.len() {
+            0 => Ok(table),
+            more => Err(TableError::Behind(more)),
+        }
+    }
+
+    /// As [`Table::read`], of the table at the beginning of a buffer.
+    pub(crate) fn read_first(bytes: &'a [u8]) -> Result<Self, TableError> {
         let truncated = |wanted| TableError::Truncated {
             got: bytes.len(),
             wanted,
@@ -71,6 +82,9 @@ impl<'a> Table<'a> {
         let contents = Contents::from_codes([code, what, features])?;
         if textures == 0 || movements == 0 || usize::from(movements) > MAX_MOVEMENTS {
             return Err(TableError::Header);
+        }
+        if usize::from(textures) > MAX_TEXTURES {
+            return Err(TableError::Textures(textures));
         }
         let mut table = Self {
             bytes,
@@ -113,21 +127,20 @@ impl<'a> Table<'a> {
             }
         }
         self.check_cells()?;
-        for texture in 0..self.textures {
-            let number = self.number(texture);
-            if (0..texture).any(|other| self.number(other) == number) {
-                return Err(TableError::Number(texture));
-            }
+        let numbers = (0..self.textures).map(|texture| self.number(texture).into());
+        if let Some(texture) = twins(numbers).first() {
+            return Err(TableError::Number(*texture));
         }
         for texture in 0..self.textures {
             let (name, next) = self.name_at(at).map_err(length)?;
+            let text = core::str::from_utf8(name).map_err(|_| TableError::Name(texture))?;
+            valid_name(text).map_err(|why| TableError::Unnamed(texture, why))?;
             at = next;
-            let twin = || {
-                self.names()
-                    .take(texture.into())
-                    .any(|other| other.as_bytes() == name)
-            };
-            if name.is_empty() || core::str::from_utf8(name).is_err() || twin() {
+        }
+        let sums = self.names().map(|name| CRC32.checksum(name.as_bytes()));
+        for texture in twins(sums) {
+            let mut before = self.names().take(texture.into());
+            if before.any(|other| self.name(texture) == Some(other)) {
                 return Err(TableError::Name(texture));
             }
         }
@@ -148,11 +161,12 @@ impl<'a> Table<'a> {
 
     #[inline]
     fn check_deviations(&self, measured: PropertySet) -> Result<(), TableError> {
+        const LEAST: u16 = (SD_LEAST / SD_STEP) as u16;
         for texture in 0..self.textures {
             for movement in (0..self.movements).filter(|&m| self.trials(texture, m) >= 2) {
                 for property in measured.iter() {
                     let cell = self.cell(texture, movement, property);
-                    if cell.is_none_or(|(_, sd)| sd == 0) {
+                    if cell.is_none_or(|(_, sd)| sd < LEAST) {
                         let action = Action::of(movement, property);
                         return Err(TableError::Deviation { texture, action });
                     }
@@ -504,4 +518,17 @@ impl<'a> Table<'a> {
     pub fn as_bytes(&self) -> &'a [u8] {
         self.bytes
     }
+}
+
+/// The textures whose value is also that of one before.
+fn twins(values: impl Iterator<Item = u32>) -> Vec<u16, MAX_TEXTURES> {
+    let (mut seen, mut twins) = (Vec::<u32, MAX_TEXTURES>::new(), Vec::new());
+    for (value, texture) in values.zip(0..) {
+        // both have space for all textures of a table
+        if seen.contains(&value) {
+            let _ = twins.push(texture);
+        }
+        let _ = seen.push(value);
+    }
+    twins
 }

@@ -91,7 +91,7 @@ fn selves(store: &mut Store<Ram>, lineage: u32) -> List<SelfLearnedRecord> {
 
 fn summary(table: &[u8], texture: u16, observed: &[(u8, u8, [i16; 3])]) -> EpisodeSummary {
     EpisodeSummary {
-        table: Table::read(table).unwrap().crc(),
+        table: Table::read_first(table).unwrap().crc(),
         texture,
         certain: true,
         observed: observed
@@ -198,7 +198,7 @@ fn it_learns_by_itself_by_the_recipe() {
         }
         assert_eq!(told, Some(learned_event("t2", slides, true)));
         total += slides;
-        let table = Table::read(&force).unwrap();
+        let table = Table::read_first(&force).unwrap();
         for movement in 0..3 {
             let known = table.whitened(2, movement);
             let at = usize::from(movement);
@@ -274,7 +274,7 @@ fn a_label_updates_a_known_texture() {
     // it has learned one movement of it by itself before
     let episode = summary(&force, 1, &[(0, 2, [-1600, 40, 50])]);
     block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
-    let by_itself = Table::read(&force).unwrap().whitened(1, 0);
+    let by_itself = Table::read_first(&force).unwrap().whitened(1, 0);
     let observed = [
         (0, 3, [-1500, 10, 20]),
         (2, 1, [-1700, -10, -20]),
@@ -406,7 +406,7 @@ fn textures_are_renamed_and_deleted() {
         let episode = summary(&force, texture, &[(0, 1, [1, 2, 3])]);
         block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
     }
-    let learned = Table::read(&force).unwrap().whitened(3, 0);
+    let learned = Table::read_first(&force).unwrap().whitened(3, 0);
     let refused = block_on(rename("elm", "oak", &old, &mut store, &mut force)).unwrap_err();
     assert_eq!(refused.to_string(), "there is no texture elm in the table");
     let refused = block_on(rename("t1", "t2", &old, &mut store, &mut force)).unwrap_err();

@@ -174,10 +174,11 @@ fn every_check_names_what_is_wrong() {
         });
         Table::read(&bytes).map(|table| table.names().map(String::from).collect::<Vec<_>>())
     };
+    let unnamed = |texture| TableError::Unnamed(texture, NameError::Empty);
     assert_eq!(named(b"\x01a\x01b").unwrap(), ["a", "b"]);
     assert_eq!(named(b"\x01a\x01a"), Err(TableError::Name(1)), "twins");
-    assert_eq!(named(b"\x01a\0"), Err(TableError::Name(1)), "empty");
-    assert_eq!(named(b"\0\x01a"), Err(TableError::Name(0)), "empty");
+    assert_eq!(named(b"\x01a\0"), Err(unnamed(1)), "empty");
+    assert_eq!(named(b"\0\x01a"), Err(unnamed(0)), "empty");
     assert_eq!(named(b""), Err(length(98, 99)), "no name");
     assert_eq!(
         named(b"\x05felt"),
@@ -249,11 +250,11 @@ fn errors_count_from_one_and_say_what_was_found() {
         "the whitening of movement 3 is damaged",
         "texture 4 has another's number",
         "section 9 is damaged",
-        "the name of texture 1 is empty, not UTF-8, or another's as well",
+        "the name of texture 1 is not UTF-8, or another's as well",
         "the table has no texture 3",
         "the table takes 93 bytes",
         "texture 1 was not learned at every movement",
-        "the name of texture 2 is longer than 255 bytes",
+        "the name of texture 2 is longer than 40 bytes",
         "texture 3, movement 2: fineness 8.5 is beyond the table's +-8",
     ]) {
         assert!(error.to_string().contains(message), "{error}");
