@@ -26,9 +26,11 @@ mod verify;
 use std::io::{self, Write as _};
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use tactus_lab::data::printable::Printable;
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
+pub(crate) use progress::tell;
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
@@ -87,7 +89,8 @@ Environment:
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
 pub(crate) fn run() -> anyhow::Result<Done> {
-    let out = &mut io::BufWriter::new(io::stdout().lock());
+    // what others wrote, names and words of a probe, goes out as text
+    let out = &mut Printable::new(io::BufWriter::new(io::stdout().lock()));
     let mut done = Done::Fully;
     let Tactus { quiet, command } = Tactus::parse();
     if quiet {

@@ -11,7 +11,7 @@ fn main() -> ExitCode {
         // `tactus features | head` is no failure
         Err(why) if is_broken_pipe(&why) => ExitCode::SUCCESS,
         Err(why) => {
-            eprintln!("error: {why:#}");
+            cmd::tell(&format!("error: {why:#}"));
             match why.downcast_ref::<cmd::BenchError>() {
                 // as a shell has it: 128 and the number of SIGINT
                 Some(why) if why.is_interrupt() => ExitCode::from(130),

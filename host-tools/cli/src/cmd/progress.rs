@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use tactus_lab::data::printable::printable;
 
 static QUIET: OnceLock<()> = OnceLock::new();
 
@@ -18,10 +19,15 @@ pub(crate) fn is_quiet() -> bool {
     QUIET.get().is_some()
 }
 
+/// Tells something beside the results.
+pub(crate) fn tell(what: &str) {
+    eprintln!("{}", printable(what));
+}
+
 /// Tells something beside the results, unless it is to be quiet.
 pub(crate) fn notice(what: &str) {
     if !is_quiet() {
-        eprintln!("{what}");
+        tell(what);
     }
 }
 

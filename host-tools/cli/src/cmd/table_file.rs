@@ -5,6 +5,8 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use tactus_core::table::Table;
+use tactus_lab::data::printable::Printable;
+use tactus_lab::data::recordings::files::open;
 use tactus_lab::data::table_file::{self, TableFileError};
 use tactus_lab::data::whole::write_whole;
 
@@ -28,7 +30,7 @@ pub(crate) fn is_pipe(file: &Path) -> bool {
 pub(crate) fn beside<'o>(file: &Path, out: &'o mut impl Write) -> Box<dyn Write + 'o> {
     match (is_pipe(file), is_quiet()) {
         (false, _) => Box::new(out),
-        (true, false) => Box::new(io::stderr()),
+        (true, false) => Box::new(Printable::new(io::stderr())),
         (true, true) => Box::new(io::sink()),
     }
 }
@@ -38,7 +40,7 @@ pub(crate) fn opened(file: &Path) -> io::Result<Box<dyn Read>> {
     Ok(if is_pipe(file) {
         Box::new(io::stdin().lock())
     } else {
-        Box::new(std::fs::File::open(file)?)
+        Box::new(open(file)?)
     })
 }
 

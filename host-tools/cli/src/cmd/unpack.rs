@@ -1,13 +1,14 @@
 //! `tactus unpack`: what the command brings along, as files.
 
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Read as _, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use tactus_core::sensor::FingerName;
 use tactus_core::table::factory;
 use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::recordings::files::open;
 use tactus_lab::eval::show::count;
 
 use super::simulate;
@@ -66,8 +67,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 }
 
 fn write(file: &Path, table: &[u8]) -> anyhow::Result<()> {
-    match fs::read(file) {
-        Ok(there) => {
+    let mut there = Vec::new();
+    match open(file).and_then(|file| file.take(table.len() as u64 + 1).read_to_end(&mut there)) {
+        Ok(_) => {
             ensure!(
                 there == table,
                 "{} is another table than the factory's: give another folder, or move it away",

@@ -7,6 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
+use tactus_lab::data::printable::printable;
 
 use super::labels::{Area, lines};
 
@@ -100,7 +101,8 @@ pub(super) fn figure(
     let mut figure = Figure {
         id: id.into(),
         title: title.to_owned(),
-        svg: drawing,
+        // of letters, too, XML knows no control characters
+        svg: printable(&drawing).into_owned(),
     };
     let tips = tips.iter().map(|tip| {
         let [left, top, right, bottom] = tip.area;
@@ -126,7 +128,8 @@ impl Figure {
 
 /// Text as XML has it.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
+    printable(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }

@@ -17,6 +17,7 @@ use tactus_link::bringup::{
 use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
 use crate::cmd::output::Format;
+use crate::cmd::tell;
 
 /// Bring up a new rig: check its parts and wires step by step, and name what is wrong
 #[derive(clap::Args)]
@@ -303,12 +304,10 @@ impl Person for Terminal {
 impl Operator for Terminal {
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble> {
         let verdict = if entry.passed { "passed" } else { "FAILED" };
-        eprintln!("{verdict}  {}: {}", step.checks, entry.saw);
+        tell(&format!("{verdict}  {}: {}", step.checks, entry.saw));
         for mistake in &entry.mistakes {
-            eprintln!(
-                "        {}\n        what to do: {}",
-                mistake.what, mistake.remedy
-            );
+            let (what, remedy) = (&mistake.what, &mistake.remedy);
+            tell(&format!("        {what}\n        what to do: {remedy}"));
         }
         Ok(entry.passed)
     }

@@ -13,6 +13,7 @@ use super::bench::Bench;
 use super::line::{Sample, Where};
 use crate::cmd::names;
 use crate::cmd::output::{Format, print_json};
+use crate::cmd::tell;
 
 /// Have the probe learn the texture under its finger from new slides; an unfinished training goes on where it stood
 #[derive(clap::Args)]
@@ -106,7 +107,7 @@ fn print(
         return Ok(());
     }
     if let Some(why) = &learned.not_noted {
-        eprintln!("{}", not_noted(why));
+        tell(&not_noted(why));
     }
     print_json(&Summary { learned, nearest }, out)
 }
