@@ -10,7 +10,7 @@ use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::{Collection, plain_name, texture_number};
 use tactus_world::textures::TEXTURES;
 
-use super::names::{nearest, unknown};
+use super::names::{listed, nearest, unknown};
 use super::progress::{notice, with_progress};
 
 pub(crate) fn measure_folder(
@@ -65,7 +65,7 @@ pub(crate) fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<
             Some(name) => format!("--material {wanted}: not in {folder}; did you mean {name}?"),
             None => {
                 let known = textures.iter().map(|t| format!("{} {}", t.id, t.name));
-                let known = known.collect::<Vec<_>>().join(", ");
+                let known = listed(&known.collect::<Vec<_>>());
                 format!("--material {wanted}: not in {folder}, which has: {known}")
             }
         }

@@ -178,3 +178,26 @@ pub(super) fn caption(root: &Root<'_>, title: &str, width: u32) -> Result<u32, F
     }
     Ok((y - LINE + 14) as u32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_control_characters_leaves_it_a_picture() {
+        let name = "\u{1b}[2J<&\u{7}\u{202e}";
+        let drawn = figure("map", name, name, (100, 100), |root| {
+            write(root, name, (50, 50), From::Middle, BLACK)?;
+            let area = [0, 0, 9, 9];
+            let says = name.to_owned();
+            Ok(vec![Tip { area, says }])
+        });
+        let svg = drawn.unwrap().svg;
+        assert_eq!(
+            svg.matches("\\u001b[2J&lt;&amp;\\u0007\\u202e").count(),
+            4,
+            "{svg}"
+        );
+        assert!(!svg.chars().any(|c| c.is_control() && c != '\n'), "{svg:?}");
+    }
+}
