@@ -4,6 +4,7 @@ mod block;
 mod movement;
 mod observation;
 mod property;
+mod signal;
 mod slide;
 
 pub use block::{BLOCK, Block, Blocks, SamplePhase};
@@ -12,4 +13,6 @@ pub use observation::{
     FEATURE_STEPS, FeatureSet, MAX_FEATURES, Observation, PDC_UNIT, Vector, WHITE_STEPS, fixed,
 };
 pub use property::{Properties, Property, PropertySet};
+pub(crate) use signal::FROZEN;
+pub use signal::Signal;
 pub use slide::{BAND_EDGES, FUSED_BANDS, FUSED_EDGES, Measurement, Slide, SlideError, roughness};

@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use tactus_lab::data::recordings::files::sha256;
+use tactus_lab::data::recordings::npy;
 use tactus_tests::properties_csv;
 
 use crate::{SIMULATED, Scratch, assert_says};
@@ -112,4 +114,250 @@ fn damaged_files_are_refused_and_named() {
         );
         at.write(name, whole);
     }
+}
+
+/// Every command that reads a folder of recordings.
+const FOLDER: [&str; 5] = [
+    "features --recordings .",
+    LEARN,
+    "evaluate --recordings . --train-slides 2 --runs 20",
+    "identify --recordings . --train-slides 2 --material burlap",
+    "import . copy",
+];
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_of_the_folder_is_not_opened() {
+    let outside = Scratch::new();
+    outside.write("secret", "the secret of somebody else\n");
+    let secret = outside.path("secret");
+    let hash = sha256(&outside.read("secret"));
+    let fifo = |path: &Path| {
+        let made = std::process::Command::new("mkfifo").arg(path).status();
+        assert!(made.unwrap().success());
+    };
+    type Put<'p> = &'p dyn Fn(&Path);
+    let puts: [(&str, Put<'_>, &str); 4] = [
+        (
+            "link out",
+            &|path| std::os::unix::fs::symlink(&secret, path).unwrap(),
+            "symbolic link",
+        ),
+        ("pipe", &fifo, "is no file but"),
+        (
+            "link to a device",
+            &|path| std::os::unix::fs::symlink("/dev/zero", path).unwrap(),
+            "symbolic link",
+        ),
+        (
+            "folder",
+            &|path| fs::create_dir(path).unwrap(),
+            "is no file but",
+        ),
+    ];
+    for (what, put, why) in puts {
+        for name in ["manifest.csv", "t001_s001_pac.npy", "INCOMPLETE"] {
+            let at = good();
+            if name == "INCOMPLETE" {
+                fs::remove_file(at.path("manifest.csv")).unwrap();
+            } else {
+                fs::remove_file(at.path(name)).unwrap();
+            }
+            put(&at.path(name));
+            for command in FOLDER {
+                let said = at.error(command, 1);
+                assert!(
+                    said.contains(name) && said.contains(why),
+                    "{what} {name}: {said}"
+                );
+                let told = ["secret of somebody", &hash]
+                    .iter()
+                    .any(|part| said.contains(part));
+                assert!(!told, "{what} {name}: {said}");
+            }
+        }
+    }
+    // a user's own link is followed, and a pipe is never waited for
+    let at = good();
+    for (name, command) in [
+        ("properties.csv", PROPERTIES),
+        ("t.tact", TABLE),
+        ("identify.jsonl", LOG),
+    ] {
+        let whole = at.read(name);
+        fs::remove_file(at.path(name)).unwrap();
+        outside.write(name, &whole);
+        std::os::unix::fs::symlink(outside.path(name), at.path(name)).unwrap();
+        assert_eq!(at.run(command).code, Some(0), "{name}");
+        fs::remove_file(at.path(name)).unwrap();
+        fifo(&at.path(name));
+        assert_says(&at.error(command, 1), &[name, "is no file but"]);
+    }
+}
+
+/// Changes the samples of a file of the folder, and its hash in the manifest.
+fn change(at: &Scratch, file: &str, samples: impl FnOnce(Vec<i16>) -> Vec<i16>) {
+    let old = at.read(file);
+    let new = npy::write(&samples(npy::read(&old).unwrap()));
+    at.write(file, &new);
+    let manifest = String::from_utf8(at.read("manifest.csv")).unwrap();
+    at.write(
+        "manifest.csv",
+        manifest.replace(&sha256(&old), &sha256(&new)),
+    );
+}
+
+#[test]
+fn a_dead_sensor_is_no_texture() {
+    // slide 2 of texture 100
+    const PAC: &str = "t100_s002_pac.npy";
+    type Change = fn(Vec<i16>) -> Vec<i16>;
+    let cases: [(&str, Change, &str); 7] = [
+        (PAC, |pac| vec![2047; pac.len()], "P_AC never changed"),
+        (PAC, |pac| vec![0; pac.len()], "P_AC never changed"),
+        (
+            PAC,
+            |pac| (0..pac.len()).map(|n| -2048 + (n % 3) as i16).collect(),
+            "P_AC never changed",
+        ),
+        (
+            PAC,
+            |mut pac| {
+                pac[3000..3300].fill(-7);
+                pac
+            },
+            "P_AC never changed",
+        ),
+        (
+            PAC,
+            |pac| {
+                pac.iter()
+                    .map(|x| x.saturating_mul(1000).clamp(-2048, 2047))
+                    .collect()
+            },
+            "is cut off",
+        ),
+        (
+            "t100_s002_still.npy",
+            |still| vec![1; still.len()],
+            "P_AC never changed",
+        ),
+        (
+            "t100_s002_pdc.npy",
+            |pdc| [&pdc[..], &pdc[..1000]].concat(),
+            "samples are missing",
+        ),
+    ];
+    for (file, dead, why) in cases {
+        let at = good();
+        change(&at, file, dead);
+        refused(&at, why);
+    }
+    // the same bytes twice
+    let at = good();
+    let first = npy::read(&at.read("t100_s001_pac.npy")).unwrap();
+    change(&at, PAC, |_| first);
+    refused(&at, "its P_AC is that of slide 1");
+}
+
+#[track_caller]
+fn refused(at: &Scratch, why: &str) {
+    for command in &FOLDER[..4] {
+        let said = at.error(command, 1);
+        assert_says(&said, &["slide 2 of Burlap: ", why, "tactus import"]);
+    }
+    assert!(!at.path("out.tact").exists());
+    // an import names it, and makes a folder that can be used
+    let said = at.printed("import . copy");
+    assert_says(
+        &said,
+        &[
+            "6 textures, 53 slides",
+            "left out: slide 2 of Burlap: ",
+            why,
+        ],
+    );
+    assert_eq!(
+        at.printed("features --recordings copy --format csv")
+            .lines()
+            .count(),
+        54
+    );
+}
+
+#[test]
+fn a_signal_that_is_cut_off_a_little_is_told() {
+    let at = good();
+    change(&at, "t100_s002_pac.npy", |mut pac| {
+        pac.iter_mut().step_by(50).for_each(|x| *x = 2047);
+        pac
+    });
+    for command in FOLDER {
+        let ran = at.run(command);
+        assert_eq!(ran.code, Some(0), "{}", ran.said);
+        let told = [ran.out, ran.said].concat();
+        assert_says(&told, &["slide 2 of Burlap: P_AC is cut off", "press less"]);
+    }
+}
+
+#[test]
+fn names_with_control_characters_are_refused_and_none_reaches_the_terminal() {
+    let plain = |text: &str| {
+        !text
+            .chars()
+            .any(|c| c.is_control() && c != '\n' || c == '\u{202e}')
+    };
+    for bad in [
+        "\u{1b}[2J",
+        "\u{9b}2J",
+        "\u{202e}dem",
+        "a\u{7}",
+        "\u{7f}",
+        "\u{2066}",
+    ] {
+        let at = good();
+        let manifest = String::from_utf8(at.read("manifest.csv")).unwrap();
+        let places = [
+            manifest.replace(",Burlap,", &format!(",Bur{bad}lap,")),
+            manifest.replace(",,,,biotac", &format!(",,An{bad}na,,biotac")),
+            manifest.replace(",,,,biotac", &format!(",lot {bad}1,,,biotac")),
+            manifest.replace(",,,,biotac", &format!(",,,{bad}1,biotac")),
+            manifest.replace("t100_s002_pac", &format!("t100{bad}_s002_pac")),
+            manifest.replace("1.262,", &format!("1.262{bad},")),
+        ];
+        for manifest in places {
+            at.write("manifest.csv", &manifest);
+            let said = at.error("features --recordings .", 1);
+            assert!(
+                plain(&said) && said.contains("manifest.csv") || said.contains("t100"),
+                "{said:?}"
+            );
+        }
+        let properties = String::from_utf8(at.read("properties.csv")).unwrap();
+        let name = properties
+            .lines()
+            .nth(1)
+            .unwrap()
+            .split(',')
+            .next()
+            .unwrap();
+        at.write(
+            "properties.csv",
+            properties.replace(&format!("\n{name},"), &format!("\nx{bad},")),
+        );
+        let said = at.error(PROPERTIES, 1);
+        assert!(plain(&said) && said.contains("does not print"), "{said:?}");
+    }
+    // what a user names is shown, too, in results and in errors
+    let at = good();
+    let said = at.printed("import . \u{1b}]0;title\u{7}red");
+    assert!(
+        plain(&said) && said.contains("\\u001b]0;title\\u0007red: 6 textures"),
+        "{said:?}"
+    );
+    let said = at.error("features --recordings \u{1b}[2Jno", 1);
+    assert!(
+        plain(&said) && said.contains("\\u001b[2Jno: no such folder"),
+        "{said:?}"
+    );
 }

@@ -27,6 +27,7 @@ mod verify;
 use std::io::{self, Write as _};
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use tactus_lab::data::printable::Printable;
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
@@ -89,7 +90,8 @@ Environment:
 Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
 
 pub(crate) fn run() -> anyhow::Result<Done> {
-    let out = &mut io::BufWriter::new(printed::Printed(io::stdout()));
+    // what others wrote, names and words of a probe, goes out as text
+    let out = &mut Printable::new(io::BufWriter::new(printed::Printed(io::stdout())));
     let mut done = Done::Fully;
     let Tactus { quiet, command } = Tactus::parse();
     if quiet {

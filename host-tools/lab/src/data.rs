@@ -1,8 +1,10 @@
 //! Recordings of slides, tables of properties, and what is read from other formats.
 
 pub mod import;
+pub mod printable;
 pub mod program;
 pub mod properties;
+mod quality;
 pub mod recorder;
 pub mod recording;
 pub mod recordings;

@@ -1,7 +1,6 @@
 //! A probe at a serial or a TCP port.
 
 use std::collections::VecDeque;
-use std::fs::File;
 use std::path::PathBuf;
 use std::pin::Pin;
 use std::sync::{Mutex, PoisonError};
@@ -13,6 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tactus_core::table::{Name, Table as Read};
 use tactus_core::wire::{ArmReport, ArmState, Command, Event, Identify, Report, Train};
+use tactus_lab::data::recordings::files;
 use tactus_lab::remote::operations::{Wanted, record};
 use tactus_link::lifting::Stopped;
 use tactus_link::line::{Line, found, only_nucleo, open};
@@ -476,7 +476,7 @@ impl Probe {
 #[pyfunction]
 fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
     let lines = py.detach(|| {
-        let (mut lines, file) = (Vec::new(), File::open(&path)?);
+        let (mut lines, file) = (Vec::new(), files::open(&path)?);
         let read = log::read(file, |line| lines.push(line));
         read.map_err(|why| why.raise_of(path.display().to_string()))?;
         Ok::<_, PyErr>(lines)

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all};
+use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all, trials};
 
 use crate::error::Raise as _;
 use crate::features::{Features, plan};
@@ -171,12 +171,10 @@ impl Recordings {
         let textures = self.set.textures().iter().zip(measured);
         let mut material = Vec::new();
         let mut names = Vec::new();
-        let mut trials = Vec::new();
+        let mut trial_numbers = Vec::new();
         for (texture, slides) in textures {
-            for (at, slide) in slides.iter().enumerate() {
-                let before = slides.iter().take(at + 1);
-                let trial = before.filter(|s| s.movement == slide.movement).count();
-                trials.push(trial as u32);
+            for trial in trials(slides) {
+                trial_numbers.push(trial as u32);
                 material.push(texture.id);
                 names.push(texture.name.as_str());
             }
@@ -200,7 +198,7 @@ impl Recordings {
         columns.set_item("name", py.import("numpy")?.call_method1("array", (names,))?)?;
         let numbers = all.iter().map(|slide| slide.number).collect();
         columns.set_item("slide", array(py, numbers))?;
-        columns.set_item("trial", array(py, trials))?;
+        columns.set_item("trial", array(py, trial_numbers))?;
         columns.set_item("roughness_is_bound", array(py, bounds.collect()))?;
         for (name, values) in [
             ("force_n", of(|s| s.movement.force_n())),

@@ -1,6 +1,5 @@
 //! Texture tables: learned, read, shown, written.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,6 +8,7 @@ use pyo3::types::{PyBytes, PyDict};
 use tactus_core::explorer;
 use tactus_core::features::Movement;
 use tactus_core::table::{FALSE_ALARM, Table as Read};
+use tactus_lab::data::recordings::files::open;
 use tactus_lab::data::table_file::read_table;
 use tactus_lab::data::whole::write_whole;
 use tactus_lab::eval::evaluate::Method;
@@ -134,7 +134,7 @@ impl Table {
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
         let mut bytes = Vec::new();
-        read_table(&path, File::open(&path), &mut bytes).map_err(|why| why.raise())?;
+        read_table(&path, open(&path), &mut bytes).map_err(|why| why.raise())?;
         Self::of(bytes)
     }
 

@@ -27,7 +27,6 @@ mod features;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
 use serde::Deserialize;
 use tactus_core::features::{Movement, Observation, Properties, fixed};
 use tactus_lab::data::recordings::files::{self, RecordingError};
@@ -38,8 +37,10 @@ use features::{Meter, ROW_BYTES, TAXELS};
 
 /// Name of the manifest.
 const MANIFEST: &str = "manifest.json";
-/// Most bytes of samples of one fabric: it is read into memory as a whole, and all fabrics at once.
-const MAX_RAW: u64 = 1 << 28;
+/// Memory of a fabric in its bytes of samples: packed, twice that at most, and unpacked.
+const COPIES: u64 = 3;
+/// Most bytes of samples of one fabric: it is read into memory as a whole.
+const MAX_RAW: u64 = files::IN_FLIGHT / COPIES / 2;
 /// Set-points, speeds in mm/s and direction of the movements that all fabrics have.
 const SETPOINTS: [u16; 3] = [120, 150, 180];
 const SPEEDS_MM_S: [u16; 5] = [10, 20, 50, 100, 120];
@@ -117,14 +118,23 @@ impl FabricSet {
     /// # Errors
     /// If the folder, its manifest or a file of samples cannot be read, makes no sense or was changed.
     pub fn open(folder: &Path) -> Result<Self, FabricError> {
-        let path = folder.join(MANIFEST);
+        let path = files::inside(folder, MANIFEST, MANIFEST)?;
         let bytes = files::read_bounded(&path, files::MAX_MANIFEST)?;
-        let manifest: Manifest = serde_json::from_slice(&bytes)
-            .map_err(|source| FabricError::Manifest { path, source })?;
+        let manifest: Manifest =
+            serde_json::from_slice(&bytes).map_err(|source| FabricError::Manifest {
+                path: path.clone(),
+                source,
+            })?;
+        for file in &manifest.files {
+            files::check_text(&path, "files", &file.fabric)?;
+        }
         let meter = Meter::default();
-        let fabrics = manifest.files.par_iter().enumerate();
-        let slides = fabrics.map(|(fabric, file)| file.slides(fabric, folder, &meter));
-        let slides: Vec<_> = slides.collect::<Result<_, FabricError>>()?;
+        let fabrics: Vec<(usize, &File)> = manifest.files.iter().enumerate().collect();
+        let slides = files::each_in_flight(
+            &fabrics,
+            |(_, file)| COPIES * file.bytes(),
+            |(fabric, file)| file.slides(*fabric, folder, &meter),
+        )?;
         let movements = movements().filter_map(|movement| Movement::try_from(movement).ok());
         Ok(Self {
             fabrics: manifest.files.into_iter().map(|file| file.fabric).collect(),
@@ -215,11 +225,14 @@ impl Recording {
 }
 
 impl File {
+    fn bytes(&self) -> u64 {
+        let rows = self.slides.iter().map(|slide| slide.rows().end).max();
+        ((rows.unwrap_or(0) * ROW_BYTES) as u64).min(MAX_RAW)
+    }
+
     /// All samples, hashes checked before and after decompression.
     fn samples(&self, path: &Path) -> Result<Vec<u8>, FabricError> {
-        let rows = self.slides.iter().map(|slide| slide.rows().end).max();
-        let bytes = (rows.unwrap_or(0) * ROW_BYTES) as u64;
-        let bytes = bytes.min(MAX_RAW);
+        let bytes = self.bytes();
         // twice the raw size is more than gzip ever needs
         let packed = files::read_bounded(path, bytes * 2 + 4096)?;
         Ok(files::unpack(

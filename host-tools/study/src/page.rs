@@ -5,6 +5,7 @@ use minijinja::Environment;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use serde::Serialize;
+use tactus_lab::data::printable::printable;
 
 /// The page that a template makes of these words and figures; `style` is the pages' CSS.
 ///
@@ -20,5 +21,6 @@ pub fn render(template: &str, page: &impl Serialize) -> Result<String, minijinja
     let style = Value::from_safe_string(include_str!("page.css").to_owned());
     templates.add_global("style", style);
     templates.add_template("page.html", template)?;
-    templates.get_template("page.html")?.render(Serde(page))
+    let page = templates.get_template("page.html")?.render(Serde(page))?;
+    Ok(printable(&page).into_owned())
 }

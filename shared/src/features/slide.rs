@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::block::{BLOCK, Block};
 use super::movement::Movement;
 use super::property::Properties;
+use super::signal::Signal;
 use crate::dsp::{BandPower, FRAME, Plan, Spectrum, SpectrumSum, TAPS};
 
 /// Edges of eight bands from 20 to 1000 Hz in equal ratios, as half-open ranges of bins.
@@ -57,10 +58,15 @@ pub enum SlideError {
     TooShort(u32),
     #[error("the background of the still finger was not measured")]
     NoBackground,
-    #[error("P_AC never changed: is the sensor connected?")]
+    #[error("P_AC never changed, or stands at an end of its range: is the sensor connected?")]
     Silent,
     #[error("samples were lost: {0}")]
     Gap(u32),
+    #[error(
+        "P_AC is cut off at an end of its range in {clipped} of {of} samples: press less, slide slower, or check the \
+         sensor"
+    )]
+    Clipped { clipped: u32, of: u32 },
 }
 
 /// One slide while its samples arrive, as [`Block`]s: the movement that makes it, what has come, and what was lost.
@@ -76,6 +82,8 @@ pub struct Slide<'p> {
     position: u32,
     power: BandPower,
     spectrum: SpectrumSum,
+    /// P_AC of the still finger, and at constant speed.
+    signals: [Signal; 2],
     shear_mn: i64,
     shears: u32,
     /// Sum of P_DC and of its squares, and their number.
@@ -99,6 +107,7 @@ impl<'p> Slide<'p> {
             position: 0,
             power: BandPower::default(),
             spectrum: SpectrumSum::default(),
+            signals: Default::default(),
             shear_mn: 0,
             shears: 0,
             pdc: (0, 0, 0),
@@ -128,6 +137,7 @@ impl<'p> Slide<'p> {
         self.position = other.position;
         self.power = other.power.clone();
         self.spectrum = other.spectrum.clone();
+        self.signals = other.signals.clone();
         (self.shear_mn, self.shears) = (other.shear_mn, other.shears);
         self.pdc = other.pdc;
         self.pace = other.pace;
@@ -162,6 +172,8 @@ impl<'p> Slide<'p> {
 
     /// P_AC of the pressed, still finger, in counts about its baseline: the background of eq. 16.
     fn push_still(&mut self, samples: &[i16]) {
+        let [signal, _] = &mut self.signals;
+        signal.push(samples);
         // the filter must have filled before its power counts
         let fill = (TAPS - 1)
             .saturating_sub(self.still_samples)
@@ -198,6 +210,8 @@ impl<'p> Slide<'p> {
         }
         self.power.push(self.plan, steady);
         self.spectrum.push(self.plan, steady);
+        let [_, signal] = &mut self.signals;
+        signal.push(steady);
         self.position = end;
     }
 
@@ -252,6 +266,9 @@ impl<'p> Slide<'p> {
         if got < wanted {
             return Err(SlideError::Unfinished { got, wanted });
         }
+        let [still, steady] = &self.signals;
+        still.check()?;
+        let clipped = steady.check()?;
         let plan = self.plan;
         let (Some(power), Some(spectrum)) = (self.power.mean(plan), self.spectrum.finish()) else {
             return Err(SlideError::TooShort(got));
@@ -267,6 +284,7 @@ impl<'p> Slide<'p> {
         Ok(Measurement {
             properties: Properties::new([traction, Some(roughness), Some(libm::logf(centroid_hz))]),
             roughness_is_bound,
+            clipped,
             pdc: mean_and_sd(self.pdc),
             pace: self.pace,
             bands: self.bands,
@@ -293,6 +311,8 @@ pub struct Measurement {
     pub properties: Properties,
     /// The texture is at most this rough: its power is lost in the background (see [`roughness`]).
     pub roughness_is_bound: bool,
+    /// [`SlideError::Clipped`] where that is to be told, though the slide counts: see [`Signal::check`].
+    pub clipped: Option<SlideError>,
     /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not
     /// given.
     pub pdc: Option<(f32, f32)>,

@@ -10,7 +10,7 @@ use super::guidance::{Again, Event, Phase, View, Way, ZONE_MN};
 use super::judge::MOVEMENT;
 use super::speed::{Moved, Speedometer};
 use crate::dsp::Plan;
-use crate::features::{BLOCK, Block, Blocks, Observation, SamplePhase, Slide, SlideError};
+use crate::features::{BLOCK, Block, Blocks, FROZEN, Observation, SamplePhase, Slide, SlideError};
 use crate::sensor::pressure::{Calibration, Channel, Pressure, RATE_HZ};
 
 /// Samples of a channel that are looked at together: 10 ms.
@@ -56,8 +56,6 @@ const UNEVEN: f32 = 0.8;
 
 /// Unreadable words in a row that show that the sensor is silent: 100 ms.
 const SILENT: u16 = 440;
-/// Equal samples of P_AC in a row that show that it hangs: 100 ms.
-const FROZEN: u16 = 220;
 
 /// Samples of a touch as they came with the last word; a slide is measured from them.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -239,11 +237,12 @@ impl<'p> Touch<'p> {
         match word {
             Some(Pressure { channel, counts }) => {
                 self.unreadable = 0;
+                let word_at_rail = counts.is_at_rail();
                 let counts = counts.get() as i16;
                 // a channel that comes too often has taken the other's place
                 let pushed = match channel {
                     Channel::Pac => {
-                        event = self.hangs(counts);
+                        event = self.hangs(counts, word_at_rail);
                         self.pac.push(counts)
                     }
                     Channel::Pdc => self.pdc.push(counts),
@@ -273,10 +272,14 @@ impl<'p> Touch<'p> {
         event
     }
 
-    fn hangs(&mut self, counts: i16) -> Option<Event> {
+    fn hangs(&mut self, counts: i16, at_rail: bool) -> Option<Event> {
         let [.., last] = self.before;
         let last = self.pac.last().copied().unwrap_or(last);
-        self.equal = if counts == last { self.equal + 1 } else { 0 };
+        self.equal = if counts == last || at_rail {
+            self.equal + 1
+        } else {
+            0
+        };
         (self.equal >= FROZEN).then_some(Event::Frozen)
     }
 
@@ -554,6 +557,7 @@ impl<'p> Touch<'p> {
         match slide.finish() {
             Ok(measurement) => Event::Slid(Observation::from(&measurement)),
             Err(SlideError::Silent) => Event::Frozen,
+            Err(SlideError::Clipped { .. }) => Event::Again(Again::TooHard),
             // all its samples are there: the remaining cause is a gap
             Err(_) => Event::Again(Again::Disturbed),
         }

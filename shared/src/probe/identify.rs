@@ -8,10 +8,11 @@ use crate::dsp::Plan;
 use crate::explorer::{
     self, Answer, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, LEADING,
 };
+use crate::features::SlideError;
 use crate::rig::{Rig, RigError};
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
-use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Verdict};
+use crate::wire::{Event, Failure, Identify, MAX_EXPECTED_OUTCOMES, Rejection, Verdict};
 
 /// The result of an exploration.
 #[derive(Clone, PartialEq, Debug)]
@@ -56,6 +57,13 @@ where
     let random = || random.next_u32();
     let mut slide: u8 = 1;
     let step = |step: ExplorationStep<'_, RigError>| {
+        if let ExplorationStep::Measured(_, measurement, _) = step {
+            measurement
+                .clipped
+                .into_iter()
+                .map(clipped)
+                .for_each(&mut tell);
+        }
         if let Some(event) = event(&step, table, &config, slide) {
             tell(event);
         }
@@ -78,6 +86,11 @@ where
         answer: verification.map(|now| now.answer),
     };
     Ok((episode, identification))
+}
+
+/// The event that P_AC was cut off in a slide that counts.
+pub(super) fn clipped(why: SlideError) -> Event {
+    Event::Trouble(Failure::Slide(Rejection::Slide(why)))
 }
 
 /// The event of a step of the exploration, in which this slide is the next or has just been made.

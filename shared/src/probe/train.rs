@@ -3,6 +3,7 @@
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
 
+use super::identify::clipped;
 use super::memory::Lent;
 use super::teach::delete_stale;
 use super::training::{Training, Wanted};
@@ -69,6 +70,11 @@ where
         match measured {
             Ok((training_record, measurement)) => {
                 rejected = 0;
+                measurement
+                    .clipped
+                    .into_iter()
+                    .map(clipped)
+                    .for_each(&mut tell);
                 store.set_training_record(&training_record).await?;
                 tell(Event::TrainingSlide {
                     movement,

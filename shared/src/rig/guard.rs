@@ -117,7 +117,7 @@ pub(crate) struct Guard {
     unguarded: Unguarded,
     /// Time without a word of P_AC and of P_DC, ms.
     silent_ms: [u32; 2],
-    /// The last P_AC and P_DC, and for how many ms they have not changed.
+    /// The last P_AC and P_DC, and for how many ms they have not changed, or stood at an end of the range.
     last: [Option<Pressure>; 2],
     frozen_ms: [u32; 2],
     damaged: [u32; SLICES],
@@ -213,7 +213,8 @@ impl Guard {
                 *silent = 0;
                 if *last != Some(*word) {
                     *last = Some(*word);
-                    *frozen = 0;
+                    // what flickers at a rail does not change either
+                    *frozen = if word.counts.is_at_rail() { *frozen } else { 0 };
                 }
             }
         }

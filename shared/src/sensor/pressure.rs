@@ -67,6 +67,13 @@ impl Counts {
     pub(crate) const fn is_clipped(self) -> bool {
         self.0 == Self::MIN.0 || self.0 == Self::MAX.0
     }
+
+    /// Returns whether the reading is within a sound finger's noise of an end of the range: a signal that stays there
+    /// stands at a rail.
+    pub(crate) const fn is_at_rail(self) -> bool {
+        const NOISE: u16 = 8;
+        self.0 <= NOISE || self.0 >= Self::MAX.0 - NOISE
+    }
 }
 
 /// One sample of one channel.

@@ -5,7 +5,7 @@ use std::io::Write;
 use clap::ValueEnum;
 use serde::Serialize;
 use tactus_core::features::{BAND_EDGES, Property};
-use tactus_lab::data::replay::MeasuredSlide;
+use tactus_lab::data::replay::trials;
 
 use super::args::Recordings;
 use super::textures::measure_folder;
@@ -51,18 +51,11 @@ struct SlideFeatures<'s> {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (set, measured) = measure_folder(&args.from.folder()?)?;
-    // the number of the trial counts the slides of one texture and movement
-    let trial = |slides: &[MeasuredSlide], at: usize| {
-        let before = slides.iter().take(at + 1);
-        before.filter(|s| s.movement == slides[at].movement).count()
-    };
-    let rows = set
-        .textures()
-        .iter()
-        .zip(&measured)
-        .flat_map(|(texture, slides)| {
-            (0..slides.len()).map(move |at| (texture, &slides[at], trial(slides, at)))
-        });
+    let textures = set.textures().iter().zip(&measured);
+    let rows = textures.flat_map(|(texture, slides)| {
+        let numbered = slides.iter().zip(trials(slides));
+        numbered.map(move |(slide, trial)| (texture, slide, trial))
+    });
     match args.format {
         Rows::Csv => {
             let bands = (0..BAND_EDGES.len() - 1).map(|band| format!(",ln_psd_band{band}"));
@@ -144,11 +137,14 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// A text as a cell: a spreadsheet takes what begins like a formula for one, unless there is an apostrophe before it.
 fn csv_field(text: &str) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let text = format!("{}{text}", if formula { "'" } else { "" });
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
-        text.to_owned()
+        text
     }
 }
 
@@ -157,7 +153,11 @@ mod tests {
     use super::csv_field;
 
     #[test]
-    fn a_name_with_a_comma_is_one_field() {
+    fn a_name_with_a_comma_is_one_field_and_none_is_a_formula() {
+        for formula in ["=1+2", "+1", "-1", "@SUM(A1)"] {
+            assert_eq!(csv_field(formula), format!("'{formula}"));
+        }
+        assert_eq!(csv_field("=A1,2"), "\"'=A1,2\"");
         assert_eq!(csv_field("Denim twill"), "Denim twill");
         assert_eq!(csv_field("5\" mesh, red"), "\"5\"\" mesh, red\"");
     }

@@ -64,12 +64,11 @@ fn known(args: &Args, to: &std::path::Path, out: &mut impl Write) -> anyhow::Res
     let textures = count(imported.textures as u64, "texture");
     let slides = count(imported.slides as u64, "slide");
     writeln!(out, "{}: {textures}, {slides}", to.display())?;
-    if imported.lost_rows > 0 {
-        writeln!(
-            out,
-            "{} of 10 ms missing from the publisher's files; what lies before and after was joined",
-            count(imported.lost_rows as u64, "row")
-        )?;
+    for slide in &imported.left_out {
+        writeln!(out, "left out: {slide}")?;
+    }
+    for slide in &imported.clipped {
+        writeln!(out, "kept: {slide}")?;
     }
     Ok(())
 }

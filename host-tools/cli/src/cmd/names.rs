@@ -7,7 +7,17 @@ pub(crate) fn unknown<'n>(wanted: &str, known: impl IntoIterator<Item = &'n str>
     let known: Vec<&str> = known.into_iter().collect();
     match nearest(wanted, &known) {
         Some(name) => format!("no texture {wanted}; did you mean {name}?"),
-        None => format!("no texture {wanted}; there are: {}", known.join(", ")),
+        None => format!("no texture {wanted}; there are: {}", listed(&known)),
+    }
+}
+
+/// The names, or the first of very many.
+pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
+    const MOST: usize = 150;
+    let first: Vec<&str> = names.iter().take(MOST).map(AsRef::as_ref).collect();
+    match names.len().saturating_sub(MOST) {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
     }
 }
 

@@ -4,6 +4,8 @@
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
+use tactus_lab::data::printable::printable;
+
 /// Standard output.
 pub(crate) struct Printed(pub(crate) io::Stdout);
 
@@ -45,10 +47,10 @@ impl Write for Beside {
 
 /// Says something on standard error, on a line of its own.
 pub(crate) fn say(what: impl Display) {
-    let _ = writeln!(Beside, "{what}");
+    let _ = writeln!(Beside, "{}", printable(&what.to_string()));
 }
 
 /// Says what somebody is to enter behind it.
 pub(crate) fn prompt(what: impl Display) {
-    let _ = write!(Beside, "{what}");
+    let _ = write!(Beside, "{}", printable(&what.to_string()));
 }

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use tactus_core::table::Table;
+use tactus_lab::data::printable::Printable;
+use tactus_lab::data::recordings::files::open;
 use tactus_lab::data::table_file::{self, TableFileError};
 use tactus_lab::data::whole::{WholeFile, write_new, write_whole};
 
@@ -89,7 +91,7 @@ pub(crate) fn is_pipe(file: &Path) -> bool {
 pub(crate) fn beside<'o>(file: &Path, out: &'o mut impl Write) -> Box<dyn Write + 'o> {
     match (is_pipe(file), is_quiet()) {
         (false, _) => Box::new(out),
-        (true, false) => Box::new(Beside),
+        (true, false) => Box::new(Printable::new(Beside)),
         (true, true) => Box::new(io::sink()),
     }
 }
@@ -99,7 +101,7 @@ pub(crate) fn opened(file: &Path) -> io::Result<Box<dyn Read>> {
     Ok(if is_pipe(file) {
         Box::new(io::stdin().lock())
     } else {
-        Box::new(std::fs::File::open(file)?)
+        Box::new(open(file)?)
     })
 }
 

@@ -6,11 +6,12 @@ use anyhow::Context as _;
 use tactus_core::table::Table;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{MeasuredSlide, measure_all};
+use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::{Collection, plain_name, texture_number};
 use tactus_world::textures::TEXTURES;
 
-use super::names::{nearest, unknown};
-use super::progress::with_progress;
+use super::names::{listed, nearest, unknown};
+use super::progress::{notice, with_progress};
 
 pub(crate) fn measure_folder(
     folder: &Path,
@@ -22,6 +23,18 @@ pub(crate) fn measure_folder(
         measure_all(&set, |_| done())
     })
     .with_context(|| format!("recordings in {}", folder.display()))?;
+    for (texture, slides) in set.textures().iter().zip(&measured) {
+        let mut clipped = slides
+            .iter()
+            .filter_map(|s| Some((s.number, s.measurement.clipped?)));
+        if let Some((number, why)) = clipped.next() {
+            let more = match clipped.count() {
+                0 => String::new(),
+                more => format!(" (and {} more of it)", count(more as u64, "slide")),
+            };
+            notice(&format!("slide {number} of {}{more}: {why}", texture.name));
+        }
+    }
     Ok((set, measured))
 }
 
@@ -50,7 +63,7 @@ pub(crate) fn find_material(set: &RecordingSet, wanted: &str) -> anyhow::Result<
             Some(name) => format!("--material {wanted}: not in {folder}; did you mean {name}?"),
             None => {
                 let known = textures.iter().map(|t| format!("{} {}", t.id, t.name));
-                let known = known.collect::<Vec<_>>().join(", ");
+                let known = listed(&known.collect::<Vec<_>>());
                 format!("--material {wanted}: not in {folder}, which has: {known}")
             }
         }

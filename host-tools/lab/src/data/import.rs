@@ -17,17 +17,22 @@
 //! **The signs of P_AC are not in the files; they are rebuilt** ([`signs`]): magnitudes are exact, power is exact,
 //! spectra are good, zero crossings and the sign of the whole are not known. The sign of P_DC is not rebuilt.
 //!
+//! A slide whose rows are not 10 ms apart, or whose samples no working sensor gives, is left out and named.
+//!
 //! The files name neither material nor force nor a still record: textures are called `matX`, and movement, window and
 //! background are those of `data/biotac`.
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use tactus_core::features::Movement;
 
+use crate::data::quality::SlideChecks;
 use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
+use crate::data::recordings::files::confined;
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result, is_there};
 use crate::data::rows::Rows;
 
@@ -45,15 +50,83 @@ const ROW_RATE_HZ: u32 = 100;
 /// Longest slide that is imported, in rows: a minute. The publisher's last six seconds.
 const MAX_ROWS: usize = 6000;
 
-/// Counts of an import.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+/// The outcome of an import.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Imported {
     /// Number of textures.
     pub textures: usize,
     /// Number of slides.
     pub slides: usize,
-    /// Rows of 10 ms that the publisher's files lack, by their timestamps: the samples before and after are joined.
-    pub lost_rows: usize,
+    /// The slides that were left out, and why: samples are missing, or are those of a dead sensor.
+    pub left_out: Vec<String>,
+    /// The slides whose P_AC is cut off a little, and how much.
+    pub clipped: Vec<String>,
+}
+
+/// The slides of one texture on their way into a folder.
+struct Copying<'w> {
+    writer: &'w mut RecordingWriter,
+    texture: usize,
+    name: String,
+    checks: SlideChecks,
+    written: usize,
+    left_out: Vec<String>,
+    clipped: Vec<String>,
+}
+
+impl<'w> Copying<'w> {
+    fn new(writer: &'w mut RecordingWriter, texture: usize, name: &str) -> Self {
+        Self {
+            writer,
+            texture,
+            name: name.to_owned(),
+            checks: SlideChecks::default(),
+            written: 0,
+            left_out: Vec::new(),
+            clipped: Vec::new(),
+        }
+    }
+
+    /// Writes the next slide, unless it is there; one with a fault is left out.
+    fn take(&mut self, number: u32, slide: std::result::Result<&Recording, String>) -> Result<()> {
+        let checked = slide.and_then(|slide| {
+            let checked = self.checks.check(slide).map_err(|why| why.to_string());
+            checked.map(|clipped| (slide, clipped))
+        });
+        let named = |why: &dyn Display| format!("slide {number} of {}: {why}", self.name);
+        match checked {
+            Ok((slide, clipped)) => {
+                self.clipped.extend(clipped.map(|why| named(&why)));
+                self.written += 1;
+                match self.writer.has(self.texture, number) {
+                    true => Ok(()),
+                    false => self.writer.write(slide),
+                }
+            }
+            Err(why) => {
+                self.left_out.push(named(&why));
+                Ok(())
+            }
+        }
+    }
+
+    /// Ends the texture.
+    /// Errors: all of its slides were left out.
+    fn end(self, done: &mut Imported) -> Result<()> {
+        done.slides += self.written;
+        match self.left_out.first().filter(|_| self.written == 0) {
+            Some(why) => {
+                let of = &self.name;
+                let cause = format!("no slide of {of} can be used, record others: {why}");
+                Err(RecordingError::said(cause))
+            }
+            None => {
+                done.left_out.extend(self.left_out);
+                done.clipped.extend(self.clipped);
+                Ok(())
+            }
+        }
+    }
 }
 
 /// Returns true if a folder has one of the layouts that say everything themselves: the project's own, that of
@@ -82,15 +155,19 @@ fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -
     };
     let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
     let mut writer = begin("import", set.folder(), to, set.textures().to_vec())?;
-    for texture in 0..done.textures {
-        for (slide, key) in set.load_texture(texture)?.iter().zip(set.slides(texture)) {
-            if !writer.has(texture, slide.number) {
-                writer.label(key.labels.clone());
-                writer.write(slide)?;
-            }
-            done.slides += 1;
-            progress(done.slides, total);
-        }
+    let mut read = 0;
+    for (texture, Texture { name, .. }) in set.textures().iter().enumerate() {
+        let mut keys = set.slides(texture).iter();
+        let mut copying = Copying::new(&mut writer, texture, name);
+        set.each_slide(texture, &mut |slide| {
+            let labels = keys.next().map(|key| key.labels.clone());
+            copying.writer.label(labels.unwrap_or_default());
+            copying.take(slide.number, Ok(&slide))?;
+            read += 1;
+            progress(read, total);
+            Ok(())
+        })?;
+        copying.end(&mut done)?;
     }
     writer.finish()?;
     Ok(done)
@@ -99,6 +176,7 @@ fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -
 fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
     let raw = from.join("raw_data");
     let raw = if raw.is_dir() { raw } else { from.to_owned() };
+    confined(from, &raw)?;
     let materials = materials(&raw)?;
     if materials.is_empty() {
         let cause = "nothing to import: neither a manifest, nor raw_data/mat1/mat1_1_bio.csv and the like of \
@@ -116,30 +194,32 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
         name: format!("mat{id}"),
     });
     let mut writer = begin("import", from, to, textures.collect())?;
+    let mut read = 0;
     for (texture, (&material, numbers)) in materials.iter().enumerate() {
-        let folder = raw.join(format!("mat{material}"));
+        let name = format!("mat{material}");
+        let folder = raw.join(&name);
+        confined(from, &folder)?;
         // a few slides at a time: rebuilding the signs takes most of a second each
         let numbers: Vec<u32> = numbers.iter().copied().collect();
+        let mut copying = Copying::new(&mut writer, texture, &name);
         for some in numbers.chunks(2 * rayon::current_num_threads()) {
             let slides: Vec<_> = some
                 .par_iter()
                 .map(|&number| {
-                    let files = SlideFiles::read(&folder, material, number)?;
-                    let lost_rows = files.bio.lost_rows;
-                    let slide =
-                        (!writer.has(texture, number)).then(|| files.slide(texture, number));
-                    Ok((slide.transpose()?, lost_rows))
+                    let slide = match SlideFiles::read(&folder, material, number)? {
+                        Ok(files) => Ok(files.slide(texture, number)?),
+                        Err(jump) => Err(jump),
+                    };
+                    Ok((number, slide))
                 })
                 .collect::<Result<_>>()?;
-            for (slide, lost_rows) in slides {
-                if let Some(slide) = slide {
-                    writer.write(&slide)?;
-                }
-                done.slides += 1;
-                done.lost_rows += lost_rows;
-                progress(done.slides, total);
+            for (number, slide) in &slides {
+                copying.take(*number, slide.as_ref().map_err(Clone::clone))?;
+                read += 1;
+                progress(read, total);
             }
         }
+        copying.end(&mut done)?;
     }
     writer.finish()?;
     Ok(done)
@@ -197,18 +277,28 @@ struct SlideFiles {
 }
 
 impl SlideFiles {
-    fn read(folder: &Path, material: u32, number: u32) -> Result<Self> {
+    /// The files, or the place where a clock jumps.
+    fn read(
+        folder: &Path,
+        material: u32,
+        number: u32,
+    ) -> Result<std::result::Result<Self, String>> {
         let file = |kind| folder.join(format!("mat{material}_{number}_{kind}.csv"));
         let (bio_path, cw_path) = (file("bio"), file("cw"));
+        confined(folder, &bio_path)?;
+        confined(folder, &cw_path)?;
         let bio = read_bio(&bio_path)?;
-        let force = read_force(&cw_path)?;
+        let (force, force_jump) = read_force(&cw_path)?;
+        if let Some(jump) = bio.jump.clone().or(force_jump) {
+            return Ok(Err(jump));
+        }
         let shear =
             interpolate(&force, &bio.times).map_err(|cause| RecordingError::at(&cw_path, cause))?;
-        Ok(Self {
+        Ok(Ok(Self {
             bio_path,
             bio,
             shear,
-        })
+        }))
     }
 
     /// The slide, with the signs of its P_AC, which take most of a second.
@@ -245,7 +335,8 @@ struct Bio {
     times: Vec<f64>,
     pac: Vec<u16>,
     pdc: Vec<i16>,
-    lost_rows: usize,
+    /// The first row that is not 10 ms after the one before.
+    jump: Option<String>,
 }
 
 const PAC_COLUMNS: [&str; 22] = [
@@ -270,14 +361,15 @@ fn read_bio(path: &Path) -> Result<Bio> {
             Ok(count)
         };
         let time: f64 = row.number("timestamp")?;
-        if let Some(before) = bio.times.last() {
-            if time <= *before {
-                let why = "not after the row before; fetch the file again";
-                return Err(row.error(Some("timestamp"), why));
-            }
-            // rows jitter by 2 ms
-            let steps = ((time - before) * f64::from(ROW_RATE_HZ)).round() as usize;
-            bio.lost_rows = bio.lost_rows.saturating_add(steps.saturating_sub(1));
+        let before = bio.times.last().copied();
+        // rows jitter by 2 ms
+        let is_next = |step: f64| 0.0 < step && (step * f64::from(ROW_RATE_HZ)).round() <= 1.0;
+        if let Some(step) = before
+            .map(|before| time - before)
+            .filter(|step| !is_next(*step))
+        {
+            let jump = || row.error(Some("timestamp"), jumped(step)).to_string();
+            bio.jump.get_or_insert_with(jump);
         }
         if bio.times.len() == MAX_ROWS {
             let why = format!("a slide has fewer rows than {MAX_ROWS}");
@@ -292,15 +384,22 @@ fn read_bio(path: &Path) -> Result<Bio> {
     Ok(bio)
 }
 
+fn jumped(step_s: f64) -> String {
+    format!("{step_s:+.3} s after the row before: the clock jumps, or samples are missing")
+}
+
 /// Times in s and tangential forces in N.
-fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
+type Forces = Vec<(f64, f64)>;
+
+/// The forces, and the first row whose time is before that of the one before it.
+fn read_force(path: &Path) -> Result<(Forces, Option<String>)> {
     let mut rows = Rows::open(path, &["timestamp", "fz"], &[])?;
-    let mut force: Vec<(f64, f64)> = Vec::new();
+    let (mut force, mut jump) = (Forces::new(), None);
     while let Some(row) = rows.next_row()? {
         let time = row.number("timestamp")?;
-        if force.last().is_some_and(|(before, _)| time < *before) {
-            let why = "before that of the row before; fetch the file again";
-            return Err(row.error(Some("timestamp"), why));
+        let step = force.last().map_or(0.0, |(before, _)| time - before);
+        if step < 0.0 {
+            jump.get_or_insert_with(|| row.error(Some("timestamp"), jumped(step)).to_string());
         }
         let newton: f64 = row.number("fz")?;
         if newton.abs() > 32.0 {
@@ -309,7 +408,7 @@ fn read_force(path: &Path) -> Result<Vec<(f64, f64)>> {
         }
         force.push((time, newton));
     }
-    Ok(force)
+    Ok((force, jump))
 }
 
 /// The force at `times`, in mN: on a straight line between its neighbours, before the first and after the last as

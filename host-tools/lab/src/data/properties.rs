@@ -44,13 +44,13 @@ impl PropertyTable {
     /// Errors: if it cannot be read, a row makes no sense, or trials are missing.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let mut rows = Rows::open(path, &COLUMNS, &[])?;
-        let (mut textures, mut movements) = (Vec::new(), Vec::new());
+        let (mut textures, mut movements) = (Names::default(), Names::default());
         let (mut train, mut validate) = (Trials::new(), Trials::new());
         let mut seen = HashSet::new();
         while let Some(row) = rows.next_row()? {
-            let index = |column, names: &mut Vec<String>| match row.text(column) {
+            let index = |column, names: &mut Names| match row.shown(column)? {
                 "" => Err(row.error(Some(column), "is empty; give a name or number")),
-                name => Ok(position_or_push(names, name)),
+                name => Ok(names.position_or_push(name)),
             };
             let texture = index("texture", &mut textures)?;
             let movement = index("movement", &mut movements)?;
@@ -64,7 +64,7 @@ impl PropertyTable {
                 }
             };
             if !seen.insert((texture, movement, trial, set == "train")) {
-                let (texture, movement) = (&textures[texture], &movements[movement]);
+                let (texture, movement) = (&textures.list[texture], &movements.list[movement]);
                 let cause = format!(
                     "{set} trial {trial} of texture {texture}, movement {movement} comes twice; number the trials"
                 );
@@ -79,8 +79,8 @@ impl PropertyTable {
             trials.entry(key).or_default().push((trial, properties));
         }
         let mut set = Self {
-            textures,
-            movements,
+            textures: textures.list,
+            movements: movements.list,
             train: Vec::new(),
             validate: Vec::new(),
         };
@@ -136,11 +136,22 @@ impl PropertyTable {
     }
 }
 
-fn position_or_push(names: &mut Vec<String>, name: &str) -> usize {
-    names.iter().position(|n| n == name).unwrap_or_else(|| {
-        names.push(name.to_owned());
-        names.len() - 1
-    })
+/// Names in the order in which they first come.
+#[derive(Default)]
+struct Names {
+    list: Vec<String>,
+    places: HashMap<String, usize>,
+}
+
+impl Names {
+    fn position_or_push(&mut self, name: &str) -> usize {
+        if let Some(place) = self.places.get(name) {
+            return *place;
+        }
+        self.places.insert(name.to_owned(), self.list.len());
+        self.list.push(name.to_owned());
+        self.list.len() - 1
+    }
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ pub struct Recording {
 }
 
 /// One texture of a set.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Texture {
     /// The number that the recordings give it.
     pub id: u32,
@@ -189,6 +189,18 @@ impl Recording {
         let [before, after] = self.outside_mn.as_ref()?;
         let inside = self.samples(false, |block| &block.shear_mn);
         Some([before, &inside, after].map(Vec::as_slice).concat())
+    }
+
+    /// Memory of its samples.
+    pub(crate) fn bytes(&self) -> u64 {
+        let outside = self
+            .outside_mn
+            .iter()
+            .flatten()
+            .map(Vec::len)
+            .sum::<usize>();
+        let counts = (self.pdc.len() + outside) * size_of::<i16>();
+        (counts + self.blocks.len() * size_of::<Block>()) as u64
     }
 
     fn samples(&self, still: bool, stream: fn(&Block) -> &[i16]) -> Vec<i16> {

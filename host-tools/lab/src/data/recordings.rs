@@ -12,6 +12,7 @@ pub mod npy;
 pub mod own;
 mod writer;
 
+use std::collections::HashSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +70,8 @@ impl fmt::Display for Sensor {
         }
     }
 }
+/// Longest note that a writer leaves in a folder that is not whole, bytes.
+const MAX_NOTE: u64 = 1 << 16;
 
 /// The recordings of one folder.
 #[derive(Debug)]
@@ -106,7 +109,7 @@ impl RecordingSet {
             let (textures, slides) = manifest.contents();
             (Source::Biotac(manifest), textures, slides)
         } else if has(files::INCOMPLETE) {
-            let by = files::read_bounded(&folder.join(files::INCOMPLETE), files::MAX_MANIFEST)?;
+            let by = files::read_named(folder, files::INCOMPLETE, files::INCOMPLETE, MAX_NOTE)?;
             let by = String::from_utf8_lossy(&by).into_owned();
             return Err(RecordingError::unfinished(folder, &by));
         } else {
@@ -165,21 +168,48 @@ impl RecordingSet {
 
     /// The movements of the set, in the order in which they are first seen.
     pub fn movements(&self) -> Vec<Movement> {
-        let mut movements = Vec::new();
-        for key in self.slides.iter().flatten() {
-            if !movements.contains(&key.movement) {
-                movements.push(key.movement);
-            }
-        }
+        let mut seen = HashSet::new();
+        let movements = self.slides.iter().flatten().map(|key| key.movement);
         movements
+            .filter(|movement| seen.insert(*movement))
+            .collect()
     }
 
     /// Reads the samples of texture number `index` of [`textures`](Self::textures), slides in the order of time.
-    /// Errors: if a file cannot be read, or its hash, size or format is wrong.
+    /// Errors: if a file cannot be read, its hash, size or format is wrong, or the samples take too much memory.
     pub fn load_texture(&self, index: usize) -> Result<Vec<Recording>> {
+        let (mut slides, mut bytes) = (Vec::new(), 0);
+        self.each_slide(index, &mut |slide| {
+            bytes += slide.bytes();
+            if bytes > files::IN_FLIGHT {
+                let name = &self.textures[index].name;
+                let cause = format!("{name} has more samples than fit into memory; split it");
+                return Err(RecordingError::at(&self.folder, cause));
+            }
+            slides.push(slide);
+            Ok(())
+        })?;
+        Ok(slides)
+    }
+
+    /// Reads the slides of a texture in the order of time, and gives each away before the next is read.
+    pub(crate) fn each_slide(
+        &self,
+        index: usize,
+        take: &mut dyn FnMut(Recording) -> Result<()>,
+    ) -> Result<()> {
         match &self.source {
-            Source::Own(manifest) => manifest.load(&self.folder, index),
-            Source::Biotac(manifest) => manifest.load(&self.folder, index),
+            Source::Own(manifest) => manifest.each_slide(&self.folder, index, take),
+            Source::Biotac(manifest) => manifest.each_slide(&self.folder, index, take),
+        }
+    }
+
+    /// Most memory that [`each_slide`](Self::each_slide) takes for a texture, bytes.
+    pub(crate) fn memory(&self, index: usize) -> u64 {
+        match &self.source {
+            // its files as they are, as samples and as blocks
+            Source::Own(_) => 16 * npy::MAX_BYTES,
+            Source::Biotac(manifest) => manifest.memory(index),
         }
     }
 }
@@ -194,8 +224,9 @@ pub(crate) fn is_there(folder: &Path) -> bool {
     manifests.iter().any(|name| has(folder, name))
 }
 
+/// True if there is something of this name; that it is a file in this folder is seen when it is opened.
 fn has(folder: &Path, name: &str) -> bool {
-    folder.join(name).is_file()
+    folder.join(name).symlink_metadata().is_ok()
 }
 
 #[cfg(test)]

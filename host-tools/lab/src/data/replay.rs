@@ -1,13 +1,16 @@
 //! Recorded slides, measured by the core: a [`Rig`] replays them one by one, or a whole folder is measured at once.
 
+use std::collections::HashMap;
+
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
 use tactus_core::rig::Rig;
 
+use crate::data::quality::SlideChecks;
 use crate::data::recording::{Recording, Texture};
+use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingSet};
 
 /// The properties of one recorded slide.
@@ -29,9 +32,20 @@ pub struct MeasuredSlide {
     pub measurement: Measurement,
 }
 
+/// Number of each slide of a texture among those of its movement, from 1.
+pub fn trials(slides: &[MeasuredSlide]) -> Vec<usize> {
+    let mut trials = HashMap::new();
+    let numbers = slides.iter().map(|slide| {
+        let trial = trials.entry(slide.movement).or_insert(0);
+        *trial += 1;
+        *trial
+    });
+    numbers.collect()
+}
+
 /// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns
 /// the slides of each texture in the order of time.
-/// Errors: the first file that cannot be read, or the first slide that has no properties.
+/// Errors: the first file that cannot be read, or the first slide that has no properties or is that of a dead sensor.
 pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
@@ -88,25 +102,27 @@ fn measure_each<T: Send>(
     of: impl Fn(&Plan, &Recording) -> Result<T, SlideError> + Sync,
 ) -> Result<Vec<Vec<T>>, RecordingError> {
     let plan = Plan::new();
-    (0..set.textures().len())
-        .into_par_iter()
-        .panic_fuse()
-        .map(|index| {
-            let texture = &set.textures()[index];
-            let measured = set
-                .load_texture(index)?
-                .iter()
-                .map(|slide| {
-                    of(&plan, slide).map_err(|why| {
-                        let (number, texture) = (slide.number, &texture.name);
-                        RecordingError::said(format!("slide {number} of {texture}: {why}"))
-                    })
-                })
-                .collect::<Result<Vec<_>, RecordingError>>()?;
-            done(texture);
-            Ok(measured)
-        })
-        .collect()
+    let textures: Vec<usize> = (0..set.textures().len()).collect();
+    let memory = |index: &usize| set.memory(*index);
+    each_in_flight(&textures, memory, |&index| {
+        let texture = &set.textures()[index];
+        let (mut checks, mut measured) = (SlideChecks::default(), Vec::new());
+        set.each_slide(index, &mut |slide| {
+            let fault = |why: String| {
+                let (number, texture) = (slide.number, &texture.name);
+                RecordingError::said(format!("slide {number} of {texture}: {why}"))
+            };
+            checks.check(&slide).map_err(|why| {
+                fault(format!(
+                    "{why}. Record it again, or let `tactus import` leave it out"
+                ))
+            })?;
+            measured.push(of(&plan, &slide).map_err(|why| fault(why.to_string()))?);
+            Ok(())
+        })?;
+        done(texture);
+        Ok(measured)
+    })
 }
 
 /// A rig whose unknown texture is a pile of recorded slides: each movement replays one of that movement, drawn without

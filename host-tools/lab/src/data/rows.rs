@@ -1,11 +1,13 @@
 //! Rows of a CSV table with a header, one at a time; every error names the file, the line and the column.
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::data::recordings::RecordingError;
+use tactus_core::table::{NameError, is_printable};
+
+use crate::data::recordings::{RecordingError, files};
 
 /// Largest table that is read, in bytes: a damaged file must not fill the memory with one endless line.
 pub const MAX_BYTES: u64 = 64 << 20;
@@ -37,7 +39,7 @@ impl Rows {
         optional: &[&'static str],
     ) -> Result<Self, RecordingError> {
         let header_error = |cause: String| fault(path, 1, None, &cause);
-        let file = File::open(path).map_err(|why| header_error(why.to_string()))?;
+        let file = files::open(path).map_err(|why| header_error(why.to_string()))?;
         let mut reader = csv::ReaderBuilder::new()
             // of "\r\n" the first half is trimmed away: csv's own way of ending a line there counts lines one short
             .terminator(csv::Terminator::Any(b'\n'))
@@ -129,6 +131,17 @@ impl<'a> Row<'a> {
     pub fn text(&self, column: &'static str) -> &'a str {
         let at = self.columns.iter().find(|(name, _)| *name == column);
         at.and_then(|&(_, i)| self.record.get(i)).unwrap_or("")
+    }
+
+    /// The text in `column`, for people to read.
+    /// Errors: a character that prints nothing, or changes those around it.
+    pub fn shown(&self, column: &'static str) -> Result<&'a str, RecordingError> {
+        let text = self.text(column);
+        let Some(hidden) = text.chars().find(|c| !is_printable(*c)) else {
+            return Ok(text);
+        };
+        let why = NameError::Unprintable(hidden.into());
+        Err(self.error(Some(column), format!("{text:?} {why}")))
     }
 
     /// The value in `column`; the error names `what` it should be.

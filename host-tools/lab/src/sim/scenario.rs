@@ -8,6 +8,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::data::recordings::files::open;
 use crate::sim::collection::{Collection, texture_number};
 use tactus_world::person::Manner;
 use tactus_world::world::Setup;
@@ -153,7 +154,8 @@ impl Scenario {
     /// Reads a scenario.
     /// Errors: the file cannot be read, or is no scenario.
     pub fn read(path: &Path) -> io::Result<Self> {
-        Ok(Self::parse(&std::fs::read(path)?)?)
+        let json = io::read_to_string(open(path)?)?;
+        Ok(Self::parse(json.as_bytes())?)
     }
 
     /// A scenario from its JSON.

@@ -7,6 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
+use tactus_lab::data::printable::printable;
 
 use super::labels::{Area, lines};
 
@@ -100,7 +101,8 @@ pub(super) fn figure(
     let mut figure = Figure {
         id: id.into(),
         title: title.to_owned(),
-        svg: drawing,
+        // of letters, too, XML knows no control characters
+        svg: printable(&drawing).into_owned(),
     };
     let tips = tips.iter().map(|tip| {
         let [left, top, right, bottom] = tip.area;
@@ -126,7 +128,8 @@ impl Figure {
 
 /// Text as XML has it.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
+    printable(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
@@ -174,4 +177,27 @@ pub(super) fn caption(root: &Root<'_>, title: &str, width: u32) -> Result<u32, F
         y += LINE;
     }
     Ok((y - LINE + 14) as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_control_characters_leaves_it_a_picture() {
+        let name = "\u{1b}[2J<&\u{7}\u{202e}";
+        let drawn = figure("map", name, name, (100, 100), |root| {
+            write(root, name, (50, 50), From::Middle, BLACK)?;
+            let area = [0, 0, 9, 9];
+            let says = name.to_owned();
+            Ok(vec![Tip { area, says }])
+        });
+        let svg = drawn.unwrap().svg;
+        assert_eq!(
+            svg.matches("\\u001b[2J&lt;&amp;\\u0007\\u202e").count(),
+            4,
+            "{svg}"
+        );
+        assert!(!svg.chars().any(|c| c.is_control() && c != '\n'), "{svg:?}");
+    }
 }

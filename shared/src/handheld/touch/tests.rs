@@ -239,6 +239,16 @@ fn a_sensor_that_is_silent_or_hangs_is_noticed() {
         pair.copy_from_slice(&[pac, pdc]);
     }
     assert_eq!(feel(&hung)[1], Event::Frozen);
+    // at an end of its range with the noise of a count
+    let counts = |n: usize| Counts::new(4092 + (n % 4) as u16).unwrap();
+    for (n, pair) in hung[1500..].chunks_exact_mut(2).enumerate() {
+        let pac = pair[0].map(|word| Pressure {
+            counts: counts(n),
+            ..word
+        });
+        pair[0] = pac;
+    }
+    assert_eq!(feel(&hung)[1], Event::Frozen);
 }
 
 proptest! {

@@ -126,21 +126,88 @@ fn the_publishers_files_are_read() {
 }
 
 #[test]
-fn lost_rows_are_counted() {
-    let (from, to) = (publisher_of(&[(2, 9, "\n")]), TempDir::new().unwrap());
-    // the folder with the materials themselves will do as well
-    let raw = from.path().join("raw_data");
-    let path = raw.join("mat2/mat2_9_bio.csv");
+fn slides_whose_clock_jumps_or_whose_sensor_is_dead_are_left_out_and_named() {
+    type Change = fn(&mut Vec<String>);
+    let changes: [(&str, &str, Change, &str); 6] = [
+        (
+            "bio",
+            "rows are missing",
+            |rows| drop(rows.drain(100..103)),
+            "bio.csv:101: column timestamp: +0.040 s",
+        ),
+        (
+            "bio",
+            "one row is missing",
+            |rows| drop(rows.remove(300)),
+            "bio.csv:301: column timestamp: +0.020 s",
+        ),
+        (
+            "bio",
+            "the clock goes back",
+            |rows| rows.swap(200, 201),
+            "bio.csv:201: column timestamp: +0.020 s",
+        ),
+        (
+            "bio",
+            "a row comes twice",
+            |rows| rows.insert(7, rows[7].clone()),
+            "bio.csv:9: column timestamp: +0.000 s",
+        ),
+        (
+            "cw",
+            "the clock goes back",
+            |rows| rows.swap(50, 51),
+            "cw.csv:52: column timestamp: -0.015 s",
+        ),
+        ("bio", "P_AC hangs", hangs, "P_AC never changed"),
+    ];
+    for (file, what, change, why) in changes {
+        let (from, to) = (publisher(), TempDir::new().unwrap());
+        // the folder with the materials themselves will do as well
+        let raw = from.path().join("raw_data");
+        let path = raw.join(format!("mat2/mat2_9_{file}.csv"));
+        let text = fs::read_to_string(&path).unwrap();
+        let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
+        change(&mut rows);
+        fs::write(&path, rows.join("\n")).unwrap();
+        let done = import(&raw, to.path(), &mut |_, _| ()).unwrap();
+        let [left_out] = &done.left_out[..] else {
+            panic!("{what}: {:?}", done.left_out);
+        };
+        assert!(left_out.starts_with("slide 9 of mat2: "), "{left_out}");
+        assert!(
+            left_out.contains(why),
+            "{what}: {why:?} is not in {left_out:?}"
+        );
+        assert_eq!((done.textures, done.slides), (2, 2), "{what}");
+        let set = RecordingSet::open(to.path()).unwrap();
+        assert_eq!(set.slides(0).len(), 1, "{what}");
+    }
+    // of a texture with no slide left the reason is said
+    let from = publisher_of(&[(2, 9, "\n")]);
+    let path = from.path().join("raw_data/mat2/mat2_9_bio.csv");
     let text = fs::read_to_string(&path).unwrap();
-    let kept = (0..)
-        .zip(text.lines())
-        .filter(|(n, _)| ![100, 101, 200].contains(n));
-    let kept: Vec<&str> = kept.map(|(_, line)| line).collect();
-    fs::write(&path, kept.join("\n")).unwrap();
-    assert_eq!(
-        import(&raw, to.path(), &mut |_, _| ()).unwrap().lost_rows,
-        3
+    let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
+    hangs(&mut rows);
+    fs::write(&path, rows.join("\n")).unwrap();
+    fails(
+        from.path(),
+        &[
+            "no slide of mat2 can be used",
+            "slide 9 of mat2: P_AC never changed",
+        ],
     );
+}
+
+/// P_AC from the second second on is that of a sensor that hangs.
+#[allow(clippy::ptr_arg)] // as the other changes
+fn hangs(rows: &mut Vec<String>) {
+    for row in &mut rows[101..] {
+        let cells: Vec<&str> = row.split(',').collect();
+        let mut cells: Vec<String> = cells.into_iter().map(str::to_owned).collect();
+        cells[4..26].fill("2047".to_owned());
+        *row = cells.join(",");
+    }
 }
 
 #[test]
@@ -148,7 +215,7 @@ fn what_is_wrong_with_the_publishers_files_is_named() {
     const CASES: &str = r#"
 mat2_9_bio.csv | 1 | pac7, | | mat2_9_bio.csv:1:  | no column pac7
 mat2_9_bio.csv | 3 | 158 | x158 | mat2_9_bio.csv:3: column timestamp | is not a number
-mat2_9_bio.csv | 3 | 1581073084 | 1581073083 | mat2_9_bio.csv:3: column timestamp | not after the row before
+mat2_9_bio.csv | 3 | 1581073084 | 1581073083 | mat2_9_bio.csv:3: column timestamp | -0.990 s after the row before
 mat2_9_bio.csv | 4 | ,100,2, | ,100,NaN, | mat2_9_bio.csv:4: column pdc | "NaN" is not a count
 mat2_9_bio.csv | 4 | ,100,2, | ,100,2,- | mat2_9_bio.csv:4: column pac1 | is not a count of 0 to 4095
 mat2_9_bio.csv | 4 | ,100,2, | ,100,4096, | mat2_9_bio.csv:4: column pdc | 4096 is not a count of 0 to 4095
@@ -157,7 +224,7 @@ mat2_9_cw.csv | 1 | ,fz, | ,force, | mat2_9_cw.csv:1:  | no column fz
 mat2_9_cw.csv | 9 | -1.9,3, | -1.9,3,inf, | mat2_9_cw.csv:9:  | fields
 mat2_9_cw.csv | 5 | ,3,1 | ,3,NaN | mat2_9_cw.csv:5: column fz | is not a
 mat2_9_cw.csv | 5 | ,3,1 | ,3,91 | mat2_9_cw.csv:5: column fz | fetch the file again
-mat2_9_cw.csv | 5 | 1581073084 | 1581073083 | mat2_9_cw.csv:5: column timestamp | before that of the row before
+mat2_9_cw.csv | 5 | 1581073084 | 1581073083 | mat2_9_cw.csv:5: column timestamp | -0.985 s after the row before
 "#;
     for [file, line, from, to, place, cause] in cells(CASES) {
         let folder = publisher_of(&[(2, 9, "\n")]);

@@ -11,8 +11,8 @@ use serde::Deserialize;
 use tactus_core::features::Movement;
 
 use super::files::{
-    BIOTAC_MANIFEST as MANIFEST, MAX_MANIFEST, RecordingError, Result, distinct_textures,
-    in_order_of_time, read_bounded, read_named, unpack,
+    BIOTAC_MANIFEST as MANIFEST, IN_FLIGHT, MAX_MANIFEST, RecordingError, Result, check_text,
+    distinct_textures, in_order_of_time, inside, read_bounded, read_named, unpack,
 };
 use super::npy::{self, MAX_SAMPLES};
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
@@ -23,8 +23,12 @@ pub(crate) const NOMINAL_FORCE_MN: u16 = 800;
 /// value.
 pub(crate) const BACKGROUND_POWER: f32 = 2.2;
 
-/// Most bytes of samples of one material: it is read into memory as a whole.
-const MAX_RAW: u64 = 1 << 30;
+/// Memory of a material in its bytes of samples: packed, twice that at most, unpacked, and as samples.
+const COPIES: u64 = 4;
+/// Most bytes of samples of one material, 1000 slides of 6 s: it is read into memory as a whole.
+const MAX_RAW: u64 = IN_FLIGHT / COPIES / 2;
+/// Most slides of all materials together.
+const MAX_SLIDES: usize = 1 << 20;
 
 /// The contents of a manifest, checked.
 #[derive(Debug)]
@@ -62,6 +66,12 @@ struct Json {
     files: Vec<Entry>,
 }
 
+/// The part of a foreign manifest that tells what it is.
+#[derive(Deserialize)]
+struct Title {
+    title: String,
+}
+
 #[derive(Deserialize, Debug)]
 struct Field {
     name: String,
@@ -90,16 +100,15 @@ impl Manifest {
     /// Reads and checks a manifest.
     /// Errors: if it cannot be read, is no such manifest, or contradicts itself.
     pub fn read(folder: &Path) -> Result<Self> {
-        let path = &folder.join(MANIFEST);
+        let path = &inside(folder, MANIFEST, MANIFEST)?;
         let fault =
             |place: &str, cause: String| RecordingError::at(path, format!("{place}: {cause}"));
         let bytes = read_bounded(path, MAX_MANIFEST)?;
         let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
             let place = format!("line {}, column {}", e.line(), e.column());
-            let json: serde_json::Value = serde_json::from_slice(&bytes).unwrap_or_default();
-            let title = json["title"].as_str().unwrap_or_default();
             // the other recordings that this program knows have a manifest of the same name
-            if title.starts_with("FabricSlide") {
+            let of = serde_json::from_slice::<Title>(&bytes);
+            if of.is_ok_and(|of| of.title.starts_with("FabricSlide")) {
                 let why = "this is FabricSlide, slides of another finger without P_AC: `tactus evaluate --fabrics \
                  DIR` plays it";
                 return fault("title", why.to_owned());
@@ -116,7 +125,12 @@ impl Manifest {
         if textures.is_empty() {
             return Err(fault("files", "no material is listed".to_owned()));
         }
+        if textures.len().saturating_mul(json.slides.len()) > MAX_SLIDES {
+            let cause = format!("more than {MAX_SLIDES} slides in all; split the folder");
+            return Err(fault("slides", cause));
+        }
         for entry in &json.files {
+            check_text(path, "files", &entry.name)?;
             if entry.n_slides == 0 || json.slides.is_empty() {
                 return Err(RecordingError::empty_texture(path, &entry.texture()));
             }
@@ -185,14 +199,22 @@ impl Manifest {
         )
     }
 
-    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
+    pub(super) fn memory(&self, texture: usize) -> u64 {
+        COPIES * self.files[texture].bytes_raw
+    }
+
+    pub(super) fn each_slide(
+        &self,
+        folder: &Path,
+        texture: usize,
+        take: &mut dyn FnMut(Recording) -> Result<()>,
+    ) -> Result<()> {
         let entry = &self.files[texture];
         let values = entry.values(folder)?;
-        let records: Vec<&[i16]> = values.chunks_exact(self.record.values).collect();
         self.slides
             .iter()
             .map(|&(number, place)| {
-                let record = records[place];
+                let record = &values[place * self.record.values..][..self.record.values];
                 let field = |span: Span| &record[span.start..][..span.count];
                 let Record {
                     pac, pdc, shear, ..
@@ -217,7 +239,7 @@ impl Manifest {
                     RecordingError::at(&self.path, cause)
                 })
             })
-            .collect()
+            .try_for_each(|slide| take(slide?))
     }
 }
 

@@ -1,15 +1,18 @@
 //! Common code of all readers and writers of recordings: their errors, bounded reads, and hashes.
 
 use std::collections::HashMap;
-use std::fmt::{Display, Write as _};
-use std::fs::File;
+use std::fmt::Display;
+use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Component, Path, PathBuf};
 
 use flate2::read::GzDecoder;
+use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
+use tactus_core::table::{NameError, is_printable};
 
 use super::Sensor;
+use crate::data::printable::printable;
 use crate::data::recording::Texture;
 
 /// Name of the manifest of the project's own format.
@@ -19,6 +22,8 @@ pub(crate) const BIOTAC_MANIFEST: &str = "manifest.json";
 pub const INCOMPLETE: &str = "INCOMPLETE";
 /// Largest manifest that is read, in bytes.
 pub const MAX_MANIFEST: u64 = 64 << 20;
+/// Bytes of samples that are in memory at once, on all cores together.
+pub const IN_FLIGHT: u64 = 256 << 20;
 
 /// A reason why recordings or a table of properties cannot be read or written: the file, the cause and a remedy.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -28,7 +33,7 @@ pub struct RecordingError(String);
 impl RecordingError {
     /// A fault of a file or folder.
     pub fn at(path: &Path, cause: impl Display) -> Self {
-        Self(format!("{}: {cause}", path.display()))
+        Self::said(format!("{}: {cause}", path.display()))
     }
 
     pub(super) fn empty_texture(manifest: &Path, texture: &Texture) -> Self {
@@ -52,7 +57,8 @@ impl RecordingError {
     }
 
     pub(crate) fn said(sentence: String) -> Self {
-        Self(sentence)
+        // names and values of files are in it
+        Self(printable(&sentence).into_owned())
     }
 
     pub(super) fn two_fingers(one: &Sensor, other: &Sensor) -> Self {
@@ -107,7 +113,66 @@ pub fn inside(folder: &Path, manifest: &str, name: &str) -> Result<PathBuf> {
         );
         return Err(RecordingError::at(&folder.join(manifest), cause));
     }
-    Ok(folder.join(relative))
+    let path = folder.join(relative);
+    confined(folder, &path)?;
+    Ok(path)
+}
+
+/// Refuses a file or folder that symbolic links lead out of the folder that it is in.
+pub fn confined(folder: &Path, path: &Path) -> Result<()> {
+    // what is not there is said when it is opened
+    let (Ok(root), Ok(target)) = (fs::canonicalize(folder), fs::canonicalize(path)) else {
+        return Ok(());
+    };
+    if target.starts_with(root) {
+        return Ok(());
+    }
+    let cause = "leads out of this folder by a symbolic link, so it is not opened; put the file itself here";
+    Err(RecordingError::at(path, cause))
+}
+
+/// Opens a file, and nothing else: a pipe would wait, and a device may do something.
+pub fn open(path: &Path) -> io::Result<File> {
+    if fs::metadata(path)?.is_file() {
+        return File::open(path);
+    }
+    let why = "is no file but a folder, pipe, socket or device, so it is not opened; give a file";
+    Err(io::Error::new(io::ErrorKind::InvalidInput, why))
+}
+
+/// Checks a text of a manifest that is shown to people.
+pub fn check_text(manifest: &Path, place: &str, text: &str) -> Result<()> {
+    let Some(hidden) = text.chars().find(|c| !is_printable(*c)) else {
+        return Ok(());
+    };
+    let why = NameError::Unprintable(hidden.into());
+    Err(RecordingError::at(
+        manifest,
+        format!("{place}: {text:?} {why}"),
+    ))
+}
+
+/// Does work on all cores, on so many items at once as take at most [`IN_FLIGHT`] bytes of memory together.
+/// Errors: that of an item.
+pub fn each_in_flight<I: Sync, T: Send, E: Send>(
+    items: &[I],
+    bytes: impl Fn(&I) -> u64,
+    work: impl Fn(&I) -> std::result::Result<T, E> + Sync,
+) -> std::result::Result<Vec<T>, E> {
+    let mut done = Vec::with_capacity(items.len());
+    let mut rest = items;
+    while !rest.is_empty() {
+        let mut sum = 0;
+        let fitting = rest.iter().take_while(|item| {
+            sum += bytes(item);
+            sum <= IN_FLIGHT
+        });
+        let (now, later) = rest.split_at(fitting.count().max(1));
+        let now = now.par_iter().panic_fuse().map(&work);
+        done.extend(now.collect::<std::result::Result<Vec<T>, E>>()?);
+        rest = later;
+    }
+    Ok(done)
 }
 
 /// The bytes of a file that a manifest names, of at most `limit` bytes.
@@ -120,7 +185,7 @@ pub(super) fn read_named(folder: &Path, manifest: &str, name: &str, limit: u64) 
 pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let io_error = |why: io::Error| RecordingError::at(path, why);
     let mut bytes = Vec::new();
-    let file = File::open(path).map_err(io_error)?;
+    let file = open(path).map_err(io_error)?;
     file.take(limit.saturating_add(1))
         .read_to_end(&mut bytes)
         .map_err(io_error)?;
@@ -135,7 +200,7 @@ pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
 pub fn sha256(bytes: &[u8]) -> String {
     let mut hex = String::new();
     for byte in Sha256::digest(bytes) {
-        let _ = write!(hex, "{byte:02x}");
+        hex += &format!("{byte:02x}");
     }
     hex
 }
@@ -147,13 +212,11 @@ pub(super) fn check_hash(
     bytes: &[u8],
     expected: &str,
 ) -> Result<()> {
-    let found = sha256(bytes);
-    if found.eq_ignore_ascii_case(expected.trim()) {
+    if sha256(bytes).eq_ignore_ascii_case(expected.trim()) {
         return Ok(());
     }
     let cause = format!(
-        "SHA-256 of {what} is {found}, the manifest says {expected}: the file was damaged or changed; fetch or record \
-         it again"
+        "SHA-256 of {what} is not the manifest's: the file was damaged or changed; fetch or record it again"
     );
     Err(RecordingError::at(path, cause))
 }

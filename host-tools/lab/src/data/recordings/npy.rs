@@ -1,7 +1,7 @@
 //! One stream of 16-bit samples as a `.npy` file, which numpy opens in one line (`numpy.load`).
 
-/// Longest stream that is read, in samples: half an hour of P_AC. A slide lasts 15 s at most.
-pub(crate) const MAX_SAMPLES: usize = 1 << 22;
+/// Longest stream that is read, in samples: two minutes of P_AC. A slide lasts 15 s at most.
+pub(crate) const MAX_SAMPLES: usize = 1 << 18;
 /// Longest file that [`read`] can be given: samples and a generous header.
 pub const MAX_BYTES: u64 = 2 * MAX_SAMPLES as u64 + 4096;
 

@@ -25,6 +25,8 @@
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it; each is
 //! a one-dimensional array of `<i2` (numpy.int16). The hash is the SHA-256 of the whole file in hexadecimal; it may
 //! be empty. The rows may come in any order; textures are taken in the order of their first row.
+use std::collections::HashMap;
+use std::collections::hash_map::Entry as Place;
 use std::path::Path;
 
 use tactus_core::features::Movement;
@@ -33,7 +35,7 @@ use tactus_core::table::valid_name;
 
 use super::files::{
     OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
-    in_order_of_time, read_named,
+    in_order_of_time, inside, read_named,
 };
 use super::npy;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
@@ -123,18 +125,22 @@ impl Manifest {
     /// Reads and checks a manifest.
     /// Errors: if it cannot be read, a row makes no sense, or two rows contradict each other.
     pub fn read(folder: &Path) -> Result<Self> {
-        let path = &folder.join(MANIFEST);
+        let path = &inside(folder, MANIFEST, MANIFEST)?;
         let mut textures: Vec<(Texture, Vec<Entry>)> = Vec::new();
+        let mut places: HashMap<Texture, usize> = HashMap::new();
         let mut rows = Rows::open(path, &COLUMNS, &LABELS)?;
         while let Some(row) = rows.next_row()? {
             let texture = Texture {
                 id: row.parse("texture", "the number of a texture")?,
-                name: row.text("name").to_owned(),
+                name: row.shown("name")?.to_owned(),
             };
             let entry = Entry::of(&row)?;
-            match textures.iter_mut().find(|(t, _)| *t == texture) {
-                Some((_, entries)) => entries.push(entry),
-                None => textures.push((texture, vec![entry])),
+            match places.entry(texture) {
+                Place::Occupied(place) => textures[*place.get()].1.push(entry),
+                Place::Vacant(place) => {
+                    textures.push((place.key().clone(), vec![entry]));
+                    place.insert(textures.len() - 1);
+                }
             }
         }
         if textures.is_empty() {
@@ -167,12 +173,15 @@ impl Manifest {
             .unzip()
     }
 
-    pub(super) fn load(&self, folder: &Path, texture: usize) -> Result<Vec<Recording>> {
+    pub(super) fn each_slide(
+        &self,
+        folder: &Path,
+        texture: usize,
+        take: &mut dyn FnMut(Recording) -> Result<()>,
+    ) -> Result<()> {
         let (_, entries) = &self.textures[texture];
-        entries
-            .iter()
-            .map(|entry| entry.load(folder, texture))
-            .collect()
+        let mut loaded = entries.iter().map(|entry| entry.load(folder, texture));
+        loaded.try_for_each(|slide| take(slide?))
     }
 }
 
@@ -197,7 +206,7 @@ impl Entry {
             _ => Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
                 .map_err(|e| row.error(None, e.to_string()))?,
         };
-        let pac_rate_hz: u32 = rate("pac_rate_hz")?;
+        let pac_rate_hz: u32 = row.parse("pac_rate_hz", "a rate in whole Hz")?;
         if pac_rate_hz != PAC_RATE_HZ {
             let cause = format!("{pac_rate_hz} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz");
             return Err(row.error(Some("pac_rate_hz"), cause));
@@ -213,27 +222,18 @@ impl Entry {
             }
         };
         let pac = Stream::of(row, "pac_file", "pac_sha256")?;
-        let [
-            lot,
-            operator,
-            note,
-            moved,
-            finger,
-            calibrated,
-            pace,
-            _,
-            session,
-            run,
-            highest,
-        ] = LABELS.map(|column| row.text(column).to_owned());
-        let code = match finger.as_str() {
+        let [lot, operator, note, session, run] = ["lot", "operator", "note", "session", "run"]
+            .map(|column| row.shown(column).map(str::to_owned));
+        let [finger, calibrated, pace, highest] =
+            ["finger", "calibrated", "pace", "highest_hz"].map(|name| row.text(name));
+        let code = match finger {
             "" => FingerCode::BIOTAC,
             name => name.parse().unwrap_or(FingerCode::OTHER),
         };
         if code == FingerCode::OTHER {
-            valid_name(&finger).map_err(|why| row.error(Some("finger"), why))?;
+            valid_name(finger).map_err(|why| row.error(Some("finger"), why))?;
         }
-        let moved = match moved.as_str() {
+        let moved = match row.text("moved") {
             "" => None,
             "yes" => Some(true),
             "no" => Some(false),
@@ -248,19 +248,19 @@ impl Entry {
             number: row.parse("slide", "the number of a slide")?,
             movement,
             labels: Labels {
-                lot,
-                operator,
-                note,
+                lot: lot?,
+                operator: operator?,
+                note: note?,
                 moved,
-                session,
-                run,
+                session: session?,
+                run: run?,
                 sensor: if code == FingerCode::OTHER {
-                    finger
+                    finger.to_owned()
                 } else {
                     String::new()
                 },
                 finger: code,
-                calibrated: match calibrated.as_str() {
+                calibrated: match calibrated {
                     "" => 0,
                     _ => row.parse("calibrated", "a day as 20261121")?,
                 },
@@ -272,11 +272,11 @@ impl Entry {
             pdc_rate_hz: rate("pdc_rate_hz")?,
             shear: Stream::of(row, "shear_file", "shear_sha256")?,
             shear_rate_hz: rate("shear_rate_hz")?,
-            pace: match pace.as_str() {
+            pace: match pace {
                 "" => None,
                 _ => Some(row.parse("pace", "a whole number of 1/1024")?),
             },
-            highest_hz: match highest.as_str() {
+            highest_hz: match highest {
                 "" => None,
                 _ => Some(row.number("highest_hz")?),
             },

@@ -6,14 +6,14 @@
 
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions};
-use std::io::{ErrorKind, Write as _};
+use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use tactus_core::sensor::FingerCode;
 
 use super::files::{
     BIOTAC_MANIFEST, INCOMPLETE, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,
-    distinct_textures, inside, read_bounded, sha256,
+    distinct_textures, inside, open, read_bounded, sha256,
 };
 use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
@@ -172,10 +172,10 @@ impl RecordingWriter {
     /// Errors: if a texture has no slide, or the manifest cannot be written.
     pub fn finish(self) -> Result<()> {
         let manifest = self.folder.join(MANIFEST);
-        for (index, texture) in self.textures.iter().enumerate() {
-            if !self.keys.iter().any(|(t, _)| *t == index) {
-                return Err(RecordingError::empty_texture(&manifest, texture));
-            }
+        let there: HashSet<usize> = self.keys.iter().map(|(texture, _)| *texture).collect();
+        let mut textures = self.textures.iter().enumerate();
+        if let Some((_, empty)) = textures.find(|(texture, _)| !there.contains(texture)) {
+            return Err(RecordingError::empty_texture(&manifest, empty));
         }
         for name in self
             .rows
@@ -319,7 +319,7 @@ fn note(command: &str) -> String {
 }
 
 fn read_note(folder: &Path) -> Result<Option<String>> {
-    match fs::read_to_string(folder.join(INCOMPLETE)) {
+    match open(&folder.join(INCOMPLETE)).and_then(io::read_to_string) {
         Ok(note) => Ok(Some(note)),
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(why) => Err(io_error(&folder.join(INCOMPLETE), why)),
@@ -349,9 +349,10 @@ fn key(row: &[String], textures: &[Texture]) -> Option<(usize, u32)> {
 
 fn read_rows(folder: &Path) -> Result<String> {
     let path = folder.join(ROWS);
-    match fs::read(&path) {
+    let mut bytes = Vec::new();
+    match open(&path).and_then(|mut rows| rows.read_to_end(&mut bytes)) {
         // a character that is cut is in the last row
-        Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
+        Ok(_) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
         Err(why) => Err(io_error(&path, why)),
     }

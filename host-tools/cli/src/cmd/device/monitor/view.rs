@@ -8,6 +8,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, BorderType, Chart, Dataset, GraphType, Paragraph};
 use tactus_core::features::Movement;
+use tactus_core::table::is_printable;
 use tactus_core::wire::Phase;
 use tactus_lab::eval::show::count;
 use tactus_link::say::phase_name;
@@ -61,6 +62,12 @@ pub(crate) fn draw(monitor: &Monitor, frame: &mut Frame<'_>) {
         [key, Span::from(format!(" {what}   "))]
     });
     frame.render_widget(Line::from(spans.concat()), keys);
+    // names and words of the probe are in it
+    for cell in &mut frame.buffer_mut().content {
+        if !cell.symbol().chars().all(is_printable) {
+            cell.set_symbol("?");
+        }
+    }
 }
 
 fn panel(title: impl Into<Line<'static>>) -> Block<'static> {

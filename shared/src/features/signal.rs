@@ -1,0 +1,186 @@
+//! Checks that P_AC comes from a sensor that works: a signal that hangs or is cut off measures no texture.
+
+use super::slide::SlideError;
+use crate::sensor::pressure::{Counts, RATE_HZ};
+
+/// So many equal samples of P_AC in a row show that it hangs: 100 ms. Its noise changes it all the time: the longest
+/// run of equal samples in 680 recorded slides of 20 materials is 6.
+pub(crate) const FROZEN: u16 = (RATE_HZ / 10) as u16;
+/// An end of the converter's range is at least so far from a sound finger's rest, which is about its middle, counts.
+const LEAST_RAIL: i32 = Counts::MAX.get() as i32 / 8 * 3;
+/// From one end of the range to the other, counts; one less where somebody cut both off alike.
+const RANGE: i32 = Counts::MAX.get() as i32 - 1;
+/// More than one of so many samples cut off is told: the powers are too low then. In the 680 slides no value that far
+/// out comes twice; an accelerometer that is slid fast over silk cuts off up to a tenth (simulated).
+const TOLD: u32 = 100;
+/// More than one of so many is no measurement.
+const REFUSED: u32 = 4;
+
+/// An extreme of the samples, and how many have it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Extreme {
+    value: i16,
+    samples: u32,
+}
+
+impl Extreme {
+    fn take(&mut self, sample: i16, is_beyond: bool) {
+        if is_beyond {
+            self.value = sample;
+            self.samples = 0;
+        }
+        self.samples += u32::from(sample == self.value);
+    }
+
+    fn is_rail(self) -> bool {
+        i32::from(self.value).abs() >= LEAST_RAIL
+    }
+}
+
+/// P_AC as it comes, in counts about its rest. The ends of the range are where samples pile up: the rest, which differs
+/// from finger to finger, need not be known.
+#[derive(Clone, Debug, Default)]
+pub struct Signal {
+    samples: u32,
+    last: Option<i16>,
+    /// Samples in a row that are equal, or beyond where an end of the range may be, on one side: a vibration comes back.
+    stands: u16,
+    hangs: bool,
+    low: Extreme,
+    high: Extreme,
+}
+
+impl Signal {
+    /// Takes the next samples.
+    pub fn push(&mut self, samples: &[i16]) {
+        for &sample in samples {
+            let is_far = |sample: i16| i32::from(sample).abs() >= LEAST_RAIL;
+            let stands = self.last.is_some_and(|last| {
+                let same_side = (last < 0) == (sample < 0);
+                last == sample || same_side && is_far(last) && is_far(sample)
+            });
+            self.stands = if stands {
+                self.stands.saturating_add(1)
+            } else {
+                0
+            };
+            self.hangs |= self.stands >= FROZEN;
+            self.last = Some(sample);
+            self.low.take(sample, sample < self.low.value);
+            self.high.take(sample, sample > self.high.value);
+        }
+        self.samples = self.samples.saturating_add(samples.len() as u32);
+    }
+
+    /// Checks what has come; [`SlideError::Clipped`] is told of a signal with more than 1 % of its samples at the ends
+    /// of the converter's range.
+    /// Errors: [`SlideError::Silent`] for a signal that did not change for 100 ms or stood at an end of the range,
+    /// [`SlideError::Clipped`] for one with more than a quarter of its samples there.
+    pub fn check(&self) -> Result<Option<SlideError>, SlideError> {
+        if self.hangs {
+            return Err(SlideError::Silent);
+        }
+        let [low, high] = [self.low, self.high];
+        let clipped = if i32::from(high.value) - i32::from(low.value) >= RANGE {
+            low.samples + high.samples
+        } else {
+            let rails = [low, high].into_iter().filter(|end| end.is_rail());
+            rails.map(|end| end.samples).max().unwrap_or(0)
+        };
+        let of = self.samples;
+        let why = SlideError::Clipped { clipped, of };
+        if clipped > of / REFUSED {
+            return Err(why);
+        }
+        Ok((clipped > of / TOLD).then_some(why))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn check(samples: impl IntoIterator<Item = i16>) -> Result<Option<SlideError>, SlideError> {
+        let samples: Vec<i16> = samples.into_iter().collect();
+        let (mut signal, mut whole) = (Signal::default(), Signal::default());
+        samples.chunks(64).for_each(|samples| signal.push(samples));
+        whole.push(&samples);
+        assert_eq!(signal.check(), whole.check(), "blocks make no difference");
+        whole.check()
+    }
+
+    /// A tone of this amplitude, cut off at the ends of a range about such a rest.
+    fn tone(amplitude: f64, rest: i32) -> impl Iterator<Item = i16> {
+        (0..6600).map(move |n| {
+            let value = (amplitude * (f64::from(n) * 0.7123).sin()).round() as i32;
+            ((value + rest).clamp(0, 4095) - rest) as i16
+        })
+    }
+
+    #[test]
+    fn a_signal_that_hangs_or_stands_at_a_rail_is_none() {
+        for value in [0, 5, 2047, -2048, i16::MAX, i16::MIN] {
+            assert_eq!(check([value; 6600]), Err(SlideError::Silent), "{value}");
+        }
+        // for 100 ms, anywhere
+        let hangs = |n: usize, at_rail: i16| {
+            tone(90.0, 2048).enumerate().map(move |(at, x)| match at {
+                at if (3000..3000 + n).contains(&at) => at_rail + at as i16 % 5,
+                _ => x,
+            })
+        };
+        for rail in [2041, -2048, 1790, -1790] {
+            assert_eq!(check(hangs(222, rail)), Err(SlideError::Silent), "{rail}");
+            assert_eq!(check(hangs(218, rail)), Ok(None), "{rail}");
+            let flickers = |(n, _): (usize, _)| rail + n as i16 % 5;
+            let all = tone(1.0, 0).enumerate().map(flickers);
+            assert_eq!(check(all), Err(SlideError::Silent), "{rail}");
+        }
+        // from one rail to the other
+        let ends = (0..6600).map(|n| if n % 3 == 0 { 2047 } else { -2048 });
+        assert!(matches!(
+            check(ends),
+            Err(SlideError::Clipped {
+                clipped: 6600,
+                of: 6600
+            })
+        ));
+    }
+
+    #[test]
+    fn more_than_one_percent_at_the_ends_of_the_range_is_told_and_a_quarter_refused() {
+        for rest in [1900, 2021, 2048, 2200] {
+            // a pure tone piles up at its own extremes, too
+            for amplitude in [1.0, 40.0, 900.0, 1600.0, 1890.0] {
+                assert_eq!(check(tone(amplitude, rest)), Ok(None), "{amplitude} {rest}");
+            }
+            let told = check(tone(2150.0, rest));
+            assert!(
+                matches!(told, Ok(Some(SlideError::Clipped { .. }))),
+                "{rest} {told:?}"
+            );
+            let refused = check(tone(9000.0, rest));
+            assert!(matches!(refused, Err(SlideError::Clipped { .. })), "{rest}");
+        }
+        let clips = |n: usize, both: bool| {
+            tone(700.0, 2048)
+                .enumerate()
+                .map(move |(at, x)| match at % 100 {
+                    0 if at / 100 < n => 2047,
+                    50 if both && at / 100 < n => -2048,
+                    _ => x,
+                })
+        };
+        assert_eq!(check(clips(66, false)), Ok(None));
+        assert_eq!(check(clips(33, true)), Ok(None));
+        let more = |clipped| Ok(Some(SlideError::Clipped { clipped, of: 6600 }));
+        assert_eq!(check(clips(34, true)), more(68));
+        let one_more = clips(66, false).enumerate();
+        assert_eq!(
+            check(one_more.map(|(at, x)| if at == 7 { 2047 } else { x })),
+            more(67)
+        );
+        assert_eq!(check([]), Ok(None));
+    }
+}
