@@ -72,7 +72,7 @@ export async function launch(program) {
   return { pid: child.pid, send, kill, on: listener => listeners.push(listener) };
 }
 
-/// A tab that collects what is wrong: errors of scripts, of the console, of the content-security policy, and whatever it loads.
+/// A tab that collects what is wrong: errors of scripts, all messages of the console, those of the content-security policy, and whatever it loads.
 export async function tab(browser, { width, height, touch = false, scheme = "light", motion = "no-preference" }) {
   const { targetId } = await browser.send("Target.createTarget", { url: "about:blank" });
   const { sessionId } = await browser.send("Target.attachToTarget", { targetId, flatten: true });
@@ -82,8 +82,8 @@ export async function tab(browser, { width, height, touch = false, scheme = "lig
     if (of !== sessionId) return;
     if (method === "Inspector.targetCrashed") errors.push("the page's process has crashed");
     if (method === "Runtime.exceptionThrown") errors.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
-    if (method === "Runtime.consoleAPICalled" && ["error", "warning"].includes(params.type)) errors.push(params.args.map(a => a.value ?? a.description).join(" "));
-    if (method === "Log.entryAdded" && params.entry.level !== "info" && params.entry.level !== "verbose") errors.push(params.entry.text);
+    if (method === "Runtime.consoleAPICalled") errors.push(`${params.type}: ` + params.args.map(a => a.value ?? a.description).join(" "));
+    if (method === "Log.entryAdded") errors.push(`${params.entry.level}: ${params.entry.text}`);
     if (method === "Network.requestWillBeSent" && !params.request.url.startsWith("data:")) loaded.push(params.request.url);
   });
   for (const domain of ["Page", "Runtime", "Log", "Network"]) await send(`${domain}.enable`);

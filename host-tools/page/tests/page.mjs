@@ -373,6 +373,40 @@ test("a probe at a serial port: stop, record, tables, and a plug that is pulled"
   assert.equal(await text(it, "u-connect"), "Connect a probe");
 }));
 
+test("a probe at a serial port: a line that is disturbed, and a plug that comes back", () => usb(async (it, unplug) => {
+  const works = async () => {
+    const before = (await said(it)).split("table ").length;
+    await press(it, "u-status");
+    await idle(it, "it says how it is");
+    assert.ok((await said(it)).split("table ").length > before, await said(it));
+    assert.equal(await text(it, "u-problem"), "");
+  };
+  await works();
+  for (const name of ["FramingError", "BreakError", "ParityError", "BufferOverrunError", "UnknownError"]) {
+    await it.evaluate(`tactusSerialFails("${name}", false)`);
+    await it.until("it reads again", "document.getElementById('u-said').textContent.length > 0");
+    await works();
+    assert.equal(await text(it, "u-connect"), "Disconnect", name);
+  }
+  assert.match(await said(it), /The line is disturbed, and bytes are lost: FramingError\./);
+  await it.evaluate("for (let n = 0; n < 20; n++) setTimeout(() => tactusSerialFails('BreakError', false), 10 * n)");
+  await new Promise(done => setTimeout(done, 300));
+  await works();
+  for (let n = 0; n < 2; n++) {
+    unplug();
+    await it.until("it is told", "/closed the port; open it again/.test(document.getElementById('u-problem').textContent)", 20);
+    assert.equal(await text(it, "u-connect"), "Connect a probe");
+    await press(it, "u-connect");
+    await it.until("it is connected again", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
+    await works();
+  }
+  await press(it, "u-connect");
+  await it.until("it is left", "document.getElementById('u-connect').textContent === 'Connect a probe'");
+  await press(it, "u-connect");
+  await it.until("it is connected once more", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
+  await works();
+}));
+
 test("without Web Serial it says which browsers have it", () => opened("", { motion: "reduce", before: it => it.before("delete Navigator.prototype.serial") }, async it => {
   await press(it, "from-usb");
   assert.equal(await it.evaluate("document.getElementById('u-all').hidden"), true);

@@ -3,23 +3,40 @@
 import { connect } from "node:net";
 
 const SHIM = `(() => {
-  let come = null, open = false;
+  // as the Web Serial specification has it: an error ends a stream; after those that are not fatal the port has another one
+  let state = "closed", gone = false, readable = null, writable = null, come = null;
   const text = bytes => btoa(String.fromCharCode(...bytes));
-  window.tactusSerialCame = base64 => come?.(Uint8Array.from(atob(base64), c => c.charCodeAt(0)));
-  window.tactusSerialGone = () => come?.(null);
+  window.tactusSerialCame = base64 => { port.readable; come?.enqueue(Uint8Array.from(atob(base64), c => c.charCodeAt(0))); };
+  window.tactusSerialFails = (name, fatal) => {
+    const failed = come;
+    gone = fatal;
+    readable = come = null;
+    failed?.error(new DOMException("A read has failed.", name));
+  };
+  window.tactusSerialGone = () => { if (state === "opened" && !gone) tactusSerialFails("NetworkError", true); };
   const port = {
     getInfo: () => ({ usbVendorId: 0x0483, usbProductId: 0x374b }),
     async open({ baudRate }) {
-      if (open) throw new DOMException("The port is already open.", "InvalidStateError");
+      if (state !== "closed") throw new DOMException("The port is already open.", "InvalidStateError");
       if (baudRate !== 921600) throw new Error("another baud rate: " + baudRate);
-      open = true;
-      this.readable = new ReadableStream({ start(to) {
-        come = bytes => { try { if (bytes) to.enqueue(bytes); else to.error(new DOMException("The device has been lost.", "NetworkError")); } catch { /* cancelled */ } };
-      } });
-      this.writable = new WritableStream({ write(bytes) { tactusSerial(JSON.stringify({ send: text(bytes) })); } });
+      [state, gone] = ["opened", false];
       tactusSerial(JSON.stringify({ open: true }));
     },
-    async close() { open = false; come = null; tactusSerial(JSON.stringify({ open: false })); },
+    get readable() {
+      if (state !== "opened" || gone) return null;
+      readable ??= new ReadableStream({ start(to) { come = to; }, cancel() { come = null; } });
+      return readable;
+    },
+    get writable() {
+      if (state !== "opened" || gone) return null;
+      writable ??= new WritableStream({ write(bytes) { tactusSerial(JSON.stringify({ send: text(bytes) })); } });
+      return writable;
+    },
+    async close() {
+      await Promise.all([readable?.cancel(), writable?.abort()]);
+      [state, readable, writable, come] = ["closed", null, null, null];
+      tactusSerial(JSON.stringify({ open: false }));
+    },
   };
   Object.defineProperty(navigator, "serial", { configurable: true, value: { requestPort: async () => port } });
 })()`;

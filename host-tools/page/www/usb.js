@@ -1,13 +1,15 @@
 "use strict";
 // A probe at a serial port: bytes between the browser's port and the module, and what is asked for.
 const Usb = (() => {
-  const BAUD = 921600, EVERY_MS = 20;
+  const BAUD = 921600, EVERY_MS = 20, CLOSING_MS = 1000;
   // of ST, who makes the NUCLEO's ST-LINK
   const BOARDS = [{ usbVendorId: 0x0483 }];
   const at = id => document.getElementById(id);
-  let page, port = null, reader = null, writer = null, came = [], timer = null, frame = null, writing = Promise.resolve();
+  // of a port that is open: its streams' reader and writer, what came and is not read yet, and the writing under way
+  let page, line = null, frame = null, closing = Promise.resolve(), lossTold = -Infinity;
 
   let buttons = [];
+  const pause = ms => new Promise(done => { const timer = setInterval(() => { clearInterval(timer); done(); }, ms); });
   const moved = () => ({ yes: true, no: false })[at("u-moved").value] ?? null;
   const seed = () => crypto.getRandomValues(new Uint32Array(1))[0];
   const now = () => Math.round(performance.now());
@@ -38,7 +40,7 @@ const Usb = (() => {
     };
     buttons = Object.keys(works);
     for (const [id, wanted] of Object.entries(works)) at(id).addEventListener("click", () => work(wanted()));
-    at("u-connect").addEventListener("click", () => port ? leave(true) : connect());
+    at("u-connect").addEventListener("click", () => line ? leave(true) : connect());
     at("u-stop").addEventListener("click", () => step({ do: "stop" }));
     at("u-log").addEventListener("click", () => step({ do: "log" }));
     at("u-yes").addEventListener("click", () => step({ do: "answer", yes: true }));
@@ -58,6 +60,7 @@ const Usb = (() => {
 
   async function connect() {
     problem();
+    let port;
     try {
       port = await navigator.serial.requestPort({ filters: BOARDS });
     } catch (why) {
@@ -66,58 +69,88 @@ const Usb = (() => {
       return;
     }
     try {
+      // the same port may still be closing
+      await closing;
       await port.open({ baudRate: BAUD, bufferSize: 65536 });
     } catch (why) {
-      port = null;
       problem(`The port does not open: ${why.message} Is it open in another tab, a terminal or another tactus? Close that, then connect again.`);
       return;
     }
-    reader = port.readable.getReader();
-    writer = port.writable.getWriter();
-    came = [];
+    const here = line = { port, reader: null, writer: null, came: [], writing: Promise.resolve(), timer: null };
     at("u-said").textContent = "";
     const { usbVendorId: vendor, usbProductId: product } = port.getInfo?.() ?? {};
     const hex = number => number.toString(16).padStart(4, "0");
     const name = vendor === undefined ? "the serial port" : `USB ${hex(vendor)}:${hex(product ?? 0)}`;
-    read(reader, port);
+    read(here);
     page.begins();
     step({ do: "connect", port: name, now_ms: now() });
-    timer = setInterval(tick, EVERY_MS);
+    here.timer = setInterval(tick, EVERY_MS);
   }
 
-  async function read(from, of) {
-    try {
-      for (;;) {
-        const { value, done } = await from.read();
-        if (done) break;
-        came.push(value);
+  // A framing, break, parity or overrun error ends the port's stream, and the port has another one then; a port that is
+  // gone has none.
+  async function read(of) {
+    while (line === of && of.port.readable) {
+      try {
+        of.reader = of.port.readable.getReader();
+        for (;;) {
+          const { value, done } = await of.reader.read();
+          if (done) { if (line === of) leave(); return; }
+          of.came.push(value);
+        }
+      } catch (why) {
+        if (line === of && of.port.readable) loses(why);
       }
-    } catch {
-      // it is told below: a port that fails is closed
+      try { of.reader?.releaseLock(); } catch { /* it has no stream any more */ }
+      // a line that does nothing but fail leaves time for the page
+      await pause(EVERY_MS);
     }
-    if (port === of) leave();
+    if (line === of) leave();
+  }
+
+  // The probe's messages have checksums: what is lost is asked for again, or told by the module.
+  function loses(why) {
+    if (now() - lossTold > 1000) say(`The line is disturbed, and bytes are lost: ${why.name}.\n`);
+    lossTold = now();
   }
 
   function tick() {
-    const received = came.flatMap(part => [...part]);
-    came = [];
+    const received = line.came.flatMap(part => [...part]);
+    line.came = [];
     step({ do: "step", now_ms: now(), received });
   }
 
-  // The port is left: by the user, or since it has failed.
-  async function leave(wanted) {
-    const [old, from, to] = [port, reader, writer];
-    port = null;
-    clearInterval(timer);
-    try {
-      const last = Probe.remote({ do: "closed" });
-      take(wanted ? { ...last, failed: null } : last);
-    } catch { /* nothing was open */ }
-    frame = null;
-    page.ends();
-    show();
-    // a port that was pulled out cannot be closed any more
-    try { await from?.cancel(); from?.releaseLock(); await writing; to?.releaseLock(); await old?.close(); } catch { /* gone */ }
+  // The port is left: by the user, or since it has failed. A step that fails keeps no other one from being done.
+  function leave(wanted) {
+    const old = line;
+    line = null;
+    clearInterval(old.timer);
+    const told = [
+      () => take({ ...Probe.remote({ do: "closed" }), ...(wanted ? { failed: null } : {}) }, old),
+      () => { frame = null; },
+      () => page.ends(),
+      show,
+    ];
+    for (const step of told) try { step(); } catch (why) { problem(page.sentence(why)); }
+    closing = close(old);
+  }
+
+  async function close(old) {
+    const steps = [
+      () => old.reader?.cancel(),
+      () => old.reader?.releaseLock(),
+      () => old.writing,
+      () => old.writer?.releaseLock(),
+      () => old.port.close(),
+    ];
+    for (const step of steps) try { await Promise.race([step(), pause(CLOSING_MS)]); } catch { /* a port that is gone */ }
+  }
+
+  // An error ends this stream, too; the next bytes ask for another one.
+  async function write(to, bytes) {
+    to.writer = to.port.writable?.getWriter();
+    try { await to.writer?.write(bytes); } catch { /* a port that is gone is told by its reader */ }
+    try { to.writer?.releaseLock(); } catch { /* it was released with the port */ }
   }
 
   function work(wanted) {
@@ -134,12 +167,12 @@ const Usb = (() => {
     }
   }
 
-  function take(now) {
+  function take(now, to = line) {
     frame = now;
-    if (now.send.length && writer) {
-      const [to, bytes] = [writer, Uint8Array.from(now.send)];
-      // in order; a port that fails is told by its reader
-      writing = writing.then(() => to.write(bytes)).catch(() => {});
+    if (now.send.length && to) {
+      const bytes = Uint8Array.from(now.send);
+      // in order
+      to.writing = to.writing.then(() => write(to, bytes)).catch(() => {});
     }
     if (now.known) { page.knows(now.known); choices(now.known.textures); }
     if (now.said) say(now.said);
@@ -150,7 +183,7 @@ const Usb = (() => {
       problem(page.sentence(new Error(now.failed)));
       page.fails();
       // nobody answers there
-      if (port && !now.connected && !now.busy) leave(true);
+      if (line && !now.connected && !now.busy) leave(true);
     }
     show();
   }
@@ -178,9 +211,9 @@ const Usb = (() => {
   // What can be asked for now.
   function show() {
     const there = frame?.connected === true, busy = frame?.busy === true;
-    at("u-connect").textContent = port ? "Disconnect" : "Connect a probe";
-    at("u-stop").disabled = !port || !busy;
-    at("u-log").disabled = !port;
+    at("u-connect").textContent = line ? "Disconnect" : "Connect a probe";
+    at("u-stop").disabled = !line || !busy;
+    at("u-log").disabled = !line;
     at("u-push").disabled = !there || busy;
     for (const id of buttons) at(id).disabled = !there || busy;
     const asked = frame?.question ?? null;
@@ -188,7 +221,7 @@ const Usb = (() => {
     if (asked !== null && at("u-asked").textContent !== asked.asked) at("u-asked").textContent = asked.asked;
     at("u-yes").textContent = asked?.yes ?? "Yes";
     at("u-no").textContent = asked?.no ?? "No";
-    at("u-say").textContent = !port ? "No probe is connected." : !frame || busy && !there ? "Looking for a probe at this port." : there ? busy ? "The probe is at work." : "The probe waits." : "No probe answers here.";
+    at("u-say").textContent = !line ? "No probe is connected." : !frame || busy && !there ? "Looking for a probe at this port." : there ? busy ? "The probe is at work." : "The probe waits." : "No probe answers here.";
   }
 
   return { build, now: () => frame };

@@ -10,7 +10,7 @@ use crate::arguments;
 use crate::error::Raise as _;
 use crate::recordings::Recordings;
 use crate::values::object;
-use crate::work::work;
+use crate::work::work_on_all_cores;
 
 /// Arguments of [`evaluate`].
 #[derive(FromPyObject)]
@@ -55,9 +55,6 @@ fn evaluate<'py>(
     let features = arguments::features(arguments.features.as_deref())?;
     let (names, slides) = (recordings.set.names(), recordings.measured(py)?);
     let train = arguments.train_slides;
-    let experiment = Experiment::recorded(names, slides, None, protocol, train, seed);
-    let experiment = experiment.map_err(|why| why.raise())?;
-    let experiment = experiment.expecting(expected).with_features(features);
     let request = EvaluationRequest {
         method,
         protocol: protocol.name(),
@@ -66,8 +63,14 @@ fn evaluate<'py>(
         config,
         with_courses: true,
     };
-    let (figures, _) = work(py, |between| {
-        evaluation(experiment, &request, |_, stage| stage(between))
+    let figures = work_on_all_cores(py, move |between| {
+        let experiment = Experiment::recorded(names, &slides, None, protocol, train, seed);
+        let experiment = experiment.map_err(|why| why.raise())?;
+        let experiment = experiment.expecting(expected).with_features(features);
+        let played = evaluation(experiment, &request, |_, stage| stage(between));
+        played
+            .map(|(figures, _)| figures)
+            .map_err(|why| why.raise())
     })?;
     object(py, &figures)
 }

@@ -18,7 +18,7 @@ use crate::arguments;
 use crate::error::Raise as _;
 use crate::features::{Features, movement};
 use crate::table::Table;
-use crate::values::{array, object};
+use crate::values::{array, no_pickle, object};
 
 type Core = explorer::Explorer<'static, MAX_TEXTURES>;
 
@@ -255,6 +255,11 @@ impl Explorer {
         let inner = self.inner();
         let reference = inner.core.best().texture;
         verify::false_accept(&inner.core, reference)
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        let instead = "pickle its Table and the Features of its slides, and update another Explorer with them";
+        no_pickle("tactus.Explorer", instead)
     }
 
     fn __repr__(&self) -> String {

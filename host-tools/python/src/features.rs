@@ -2,16 +2,19 @@
 
 use std::sync::OnceLock;
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tactus_core::dsp::{BIN_HZ, BINS, Plan};
-use tactus_core::features::{Measurement, Movement, Observation, Property};
+use serde::{Deserialize, Serialize};
+use tactus_core::dsp::{BIN_HZ, BINS, Plan, Spectrum};
+use tactus_core::features::{Measurement, Movement, Observation, Properties, Property};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::replay::{MeasuredSlide, measure};
 
 use crate::error::{Raise as _, SlideError};
-use crate::values::array;
+use crate::samples::samples;
+use crate::values::{Pickled, array, pickled, unpickled};
+use crate::work::work;
 
 /// What one slide measures.
 #[pyclass(frozen, module = "tactus")]
@@ -114,6 +117,20 @@ impl Features {
         self.measurement.pdc
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
+        let measured = &self.measurement;
+        let saved = Saved {
+            movement: self.movement,
+            properties: measured.properties,
+            roughness_is_bound: measured.roughness_is_bound,
+            pdc: measured.pdc,
+            pace: measured.pace,
+            background: measured.background,
+            spectrum: measured.spectrum.psd().to_vec(),
+        };
+        pickled(py, "_features", &saved)
+    }
+
     fn __repr__(&self) -> String {
         let values = Property::ALL.map(|property| match self.property(property) {
             Some(value) => format!("{property} {value:.3}"),
@@ -133,22 +150,16 @@ pub(crate) fn movement(force_n: f32, speed_mm_s: f32) -> PyResult<Movement> {
     Movement::from_si(force_n, speed_mm_s).map_err(|why| why.raise())
 }
 
-fn samples<'a>(name: &str, array: &'a PyReadonlyArray1<'_, i16>) -> PyResult<&'a [i16]> {
-    array.as_slice().map_err(|_| {
-        PyValueError::new_err(format!(
-            "{name} is not contiguous: numpy.ascontiguousarray makes it so"
-        ))
-    })
-}
-
 /// The `Features` of a slide of which the samples are here.
 ///
-/// pac: int16 of shape (samples,), P_AC at 2200 Hz in counts about the still baseline, from the start of the record.
+/// pac: P_AC at 2200 Hz in counts about the still baseline, from the start of the record: an array of shape (samples,)
+/// or a list of whole numbers that 16 bits hold; it is copied before other threads run, and so are the other samples.
 /// window_s: start and end of the part at constant speed, s. force_n, speed_mm_s: the movement. still: P_AC of the
-/// finger at rest (int16, 2200 Hz), or background: its power after the band-pass, counts^2. One is needed. shear_mn:
-/// tangential force, int16, mN, at shear_rate_hz. pdc: P_DC, int16, counts, at pdc_rate_hz. Both from the same start.
+/// finger at rest (2200 Hz), or background: its power after the band-pass, counts^2. One is needed. shear_mn:
+/// tangential force, mN, at shear_rate_hz. pdc: P_DC, counts, at pdc_rate_hz. Both from the same start.
 ///
-/// Raises SlideError where there are no features in it, ValueError where an array is not contiguous.
+/// Raises SlideError where there are no features in it; TypeError for samples that are no whole numbers; ValueError for
+/// another shape, masked samples, and numbers beyond 16 bits; KeyboardInterrupt after Ctrl-C.
 #[pyfunction]
 #[pyo3(signature = (pac, *, window_s, force_n, speed_mm_s, still=None, background=None, shear_mn=None,
     shear_rate_hz=100, pdc=None, pdc_rate_hz=100))]
@@ -158,26 +169,24 @@ fn samples<'a>(name: &str, array: &'a PyReadonlyArray1<'_, i16>) -> PyResult<&'a
 )]
 fn features(
     py: Python<'_>,
-    pac: PyReadonlyArray1<'_, i16>,
+    pac: &Bound<'_, PyAny>,
     window_s: (f32, f32),
     force_n: f32,
     speed_mm_s: f32,
-    still: Option<PyReadonlyArray1<'_, i16>>,
+    still: Option<&Bound<'_, PyAny>>,
     background: Option<f32>,
-    shear_mn: Option<PyReadonlyArray1<'_, i16>>,
+    shear_mn: Option<&Bound<'_, PyAny>>,
     shear_rate_hz: u32,
-    pdc: Option<PyReadonlyArray1<'_, i16>>,
+    pdc: Option<&Bound<'_, PyAny>>,
     pdc_rate_hz: u32,
 ) -> PyResult<Features> {
-    let of = |name, array: &Option<PyReadonlyArray1<'_, i16>>| -> PyResult<Option<Vec<i16>>> {
-        let copied = |array| samples(name, array).map(<[i16]>::to_vec);
-        array.as_ref().map(copied).transpose()
+    let of = |name, given: Option<&Bound<'_, PyAny>>| {
+        given.map(|given| samples(name, given)).transpose()
     };
     let movement = movement(force_n, speed_mm_s)?;
-    let (still, pdc) = (of("still", &still)?, of("pdc", &pdc)?);
-    let shear = of("shear_mn", &shear_mn)?;
-    let pac = samples("pac", &pac)?;
-    py.detach(|| {
+    let (still, pdc) = (of("still", still)?, of("pdc", pdc)?);
+    let (shear, pac) = (of("shear_mn", shear_mn)?, samples("pac", pac)?);
+    work(py, move |_| {
         let recording = Recording {
             texture: 0,
             number: 0,
@@ -195,18 +204,52 @@ fn features(
             pace: None,
             shear_rate_hz,
         };
-        let cut = recording.cut(&still.unwrap_or_default(), pac, shear.as_deref());
+        let cut = recording.cut(&still.unwrap_or_default(), &pac, shear.as_deref());
         let cut = cut.map_err(SlideError::new_err)?;
         let mut measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
         measurement.pdc = measurement.pdc.filter(|_| pdc.is_some());
-        Ok(Features {
+        Ok::<_, PyErr>(Features {
             movement,
             measurement,
         })
     })
 }
 
+/// All that [`Features`] holds, pickled.
+#[derive(Serialize, Deserialize)]
+struct Saved {
+    movement: Movement,
+    properties: Properties,
+    roughness_is_bound: bool,
+    pdc: Option<(f32, f32)>,
+    pace: Option<i16>,
+    background: f32,
+    spectrum: Vec<f32>,
+}
+
+/// The `Features` that were pickled.
+#[pyfunction]
+fn _features(saved: &str) -> PyResult<Features> {
+    let saved: Saved = unpickled("Features", saved)?;
+    let spectrum: Result<[f32; BINS], _> = saved.spectrum.try_into();
+    let bins = |found: Vec<f32>| PyValueError::new_err(format!("{} bins, not {BINS}", found.len()));
+    Ok(Features {
+        movement: saved.movement,
+        measurement: Measurement {
+            properties: saved.properties,
+            roughness_is_bound: saved.roughness_is_bound,
+            pdc: saved.pdc,
+            pace: saved.pace,
+            background: saved.background,
+            spectrum: Spectrum::from(spectrum.map_err(bins)?),
+        },
+    })
+}
+
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Features>()?;
+    // a fork that comes while it is made would leave it half made
+    plan();
+    module.add_function(wrap_pyfunction!(_features, module)?)?;
     module.add_function(wrap_pyfunction!(features, module)?)
 }

@@ -9,6 +9,7 @@ mod explorer;
 mod features;
 mod probe;
 mod recordings;
+mod samples;
 mod simulate;
 mod table;
 mod values;

@@ -26,7 +26,8 @@ use crate::arguments;
 use crate::error::{ProbeError, Raise as _};
 use crate::recordings::Slide;
 use crate::table::Table;
-use crate::values::object;
+use crate::values::{no_pickle, object};
+use crate::work::work;
 
 /// A probe. port: its serial port, or tcp:HOST:PORT; the only NUCLEO that is plugged in, unless given. timeout_s: a
 /// probe that says nothing for so long is taken for gone; its longest silence is 2 s. log: a new file for all requests
@@ -39,6 +40,7 @@ use crate::values::object;
 pub(crate) struct Probe {
     name: String,
     linked: Linked,
+    opened_by: u32,
     inner: Mutex<Option<Inner>>,
 }
 
@@ -73,34 +75,69 @@ impl Inner {
         Ok(polled)
     }
 
-    /// Reads once for what is under way.
-    fn step(&mut self) -> PyResult<()> {
+    /// Reads once for what is under way; ready where nothing is.
+    fn step(&mut self) -> PyResult<Poll<Result<(), OperationError>>> {
         let Some(mut job) = self.job.take() else {
-            return Ok(());
+            return Ok(Poll::Ready(Ok(())));
         };
-        match self.poll(Pin::new(&mut job))? {
-            Poll::Ready(done) => done.map_err(|why| why.raise()),
-            Poll::Pending => {
-                self.job = Some(job);
-                Ok(())
-            }
+        let polled = self.poll(Pin::new(&mut job))?;
+        if polled.is_pending() {
+            self.job = Some(job);
         }
+        Ok(polled)
+    }
+}
+
+impl Probe {
+    /// Does something with the port, without the interpreter's lock.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Inner) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        // two processes that read one port take each other's answers
+        if self.opened_by != std::process::id() {
+            return Err(ProbeError::new_err(
+                "this probe was opened by the process from which this one was forked: close it there and open it here, \
+                 or start processes with multiprocessing.get_context(\"spawn\")",
+            ));
+        }
+        py.detach(|| {
+            let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let inner = inner.as_mut();
+            work(inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?)
+        })
     }
 
-    /// Stops what is under way, and waits until the finger is lifted.
-    fn stop(&mut self) -> PyResult<()> {
-        let Some(mut job) = self.job.take() else {
+    /// Stops what is under way, and waits until the finger is lifted; Ctrl-C ends the wait.
+    fn halt(&self, py: Python<'_>) -> PyResult<()> {
+        let is_at_work = self.with(py, |inner| {
+            if inner.job.is_some() {
+                inner.port.probe().stop();
+            }
+            Ok(inner.job.is_some())
+        })?;
+        if !is_at_work {
             return Ok(());
-        };
-        self.port.probe().stop();
-        let done = loop {
-            if let Poll::Ready(done) = self.poll(Pin::new(&mut job))? {
-                break done;
+        }
+        let stopped = loop {
+            match self.with(py, Inner::step) {
+                Ok(Poll::Pending) => {}
+                Ok(Poll::Ready(done)) => break Ok(done),
+                Err(why) => break Err(why),
+            }
+            if let Err(signal) = py.check_signals() {
+                break Err(signal);
             }
         };
-        self.port.probe().clear_stop();
-        self.reports.clear();
-        match done {
+        self.linked.clear_stop();
+        self.with(py, |inner| {
+            inner.reports.clear();
+            // after Ctrl-C it has been told to stop, and nobody waits for it a second time
+            inner.job = None;
+            Ok(())
+        })?;
+        match stopped? {
             Ok(())
             | Err(
                 OperationError::Stopped(Stopped::Lifted)
@@ -112,23 +149,8 @@ impl Inner {
             Err(why) => Err(why.raise()),
         }
     }
-}
 
-impl Probe {
-    /// Does something with the port, without the interpreter's lock.
-    fn with<T: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(&mut Inner) -> PyResult<T> + Send,
-    ) -> PyResult<T> {
-        py.detach(|| {
-            let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-            let inner = inner.as_mut();
-            work(inner.ok_or_else(|| ProbeError::new_err("the probe was closed"))?)
-        })
-    }
-
-    /// Does an operation. Ctrl-C stops it, and the rig with it.
+    /// Does an operation. Ctrl-C stops it, and the rig with it; once more, and nobody waits for that either.
     fn complete<T: Send>(
         &self,
         py: Python<'_>,
@@ -142,11 +164,13 @@ impl Probe {
             if let Poll::Ready(done) = polled {
                 break done;
             }
-            if signal.is_ok() {
-                signal = py.check_signals();
+            if let Err(why) = py.check_signals() {
                 if signal.is_err() {
-                    self.linked.stop();
+                    self.linked.clear_stop();
+                    return Err(why);
                 }
+                self.linked.stop();
+                signal = Err(why);
             }
         };
         if signal.is_err() {
@@ -194,7 +218,9 @@ impl Probe {
                 if let Some(report) = inner.reports.pop_front() {
                     return Ok((Some(report), true));
                 }
-                inner.step()?;
+                if let Poll::Ready(done) = inner.step()? {
+                    done.map_err(|why| why.raise())?;
+                }
                 let report = inner.reports.pop_front();
                 Ok((report, inner.job.is_some() || !inner.reports.is_empty()))
             })?;
@@ -202,7 +228,7 @@ impl Probe {
                 return Ok(report);
             }
             if let Err(signal) = py.check_signals() {
-                self.with(py, Inner::stop)?;
+                self.halt(py)?;
                 return Err(signal);
             }
         }
@@ -228,7 +254,14 @@ impl Events {
 
     /// Stops what is under way, and waits until the finger is lifted.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
-        self.probe.get().with(py, Inner::stop)
+        self.probe.get().halt(py)
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        no_pickle(
+            "tactus.Events",
+            "take its reports, which are dicts, and pickle those",
+        )
     }
 }
 
@@ -261,17 +294,16 @@ impl Probe {
     ) -> PyResult<Self> {
         let timeout = Duration::try_from_secs_f64(timeout_s)
             .map_err(|why| PyValueError::new_err(format!("timeout_s: {why}")))?;
-        let (name, line, lock) = py
-            .detach(|| {
-                let name = port.map_or_else(|| only_nucleo(found()), Ok)?;
-                open(&name).map(|(line, lock)| (name, line, lock))
-            })
-            .map_err(|why| why.raise())?;
+        let (name, line, lock) = work(py, move |_| {
+            let name = port.map_or_else(|| only_nucleo(found()), Ok)?;
+            open(&name).map(|(line, lock)| (name, line, lock))
+        })?;
         let log = log.map(|path| Log::create(&path, &name)).transpose()?;
         let linked = Linked::new(&name, timeout, timeout);
         Ok(Self {
             name,
             linked: linked.clone(),
+            opened_by: std::process::id(),
             inner: Mutex::new(Some(Inner {
                 port: Port::new(line, linked),
                 log,
@@ -433,7 +465,7 @@ impl Probe {
 
     /// Stops what is under way and lifts the finger.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        self.with(py, Inner::stop)?;
+        self.halt(py)?;
         self.complete(py, operations::stop(&self.linked))
     }
 
@@ -444,14 +476,24 @@ impl Probe {
     }
 
     /// Stops what is under way, and gives the port back.
-    fn close(&self, py: Python<'_>) {
-        py.detach(|| {
-            let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(mut inner) = inner.take() {
-                // a line that failed cannot be told to stop
-                let _ = inner.stop();
-            }
-        });
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        let stopped = self.halt(py);
+        // in a process that was forked from the one that opened it, the port is not ours to give back
+        if self.opened_by == std::process::id() {
+            py.detach(|| *self.inner.lock().unwrap_or_else(PoisonError::into_inner) = None);
+        }
+        // a line that failed cannot be told to stop
+        stopped.or_else(|why| match why.is_instance_of::<ProbeError>(py) {
+            true => Ok(()),
+            false => Err(why),
+        })
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        no_pickle(
+            "tactus.Probe",
+            "one process has a port: close it there, and open it in the other one",
+        )
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {
@@ -459,8 +501,8 @@ impl Probe {
     }
 
     #[pyo3(signature = (*_error))]
-    fn __exit__(&self, py: Python<'_>, _error: &Bound<'_, pyo3::types::PyTuple>) {
-        self.close(py);
+    fn __exit__(&self, py: Python<'_>, _error: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        self.close(py)
     }
 
     fn __repr__(&self) -> String {
@@ -475,7 +517,7 @@ impl Probe {
 /// Raises ProbeError where it is no log, or of another version, OSError where it cannot be read.
 #[pyfunction]
 fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Bound<'_, PyAny>>> {
-    let lines = py.detach(|| {
+    let lines = work(py, move |_| {
         let (mut lines, file) = (Vec::new(), files::open(&path)?);
         let read = log::read(file, |line| lines.push(line));
         read.map_err(|why| why.raise_of(path.display().to_string()))?;

@@ -1,6 +1,7 @@
 //! Folders of recordings, and the slides in them.
 
-use std::path::{Path, PathBuf};
+use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use numpy::PyArray1;
@@ -15,8 +16,8 @@ use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all, trials};
 
 use crate::error::Raise as _;
 use crate::features::{Features, plan};
-use crate::values::{array, rows};
-use crate::work::work;
+use crate::values::{Pickled, array, pickled, rows, unpickled};
+use crate::work::{work, work_on_all_cores};
 
 /// A folder of recorded slides, in the project's own format or that of BioTac_slide_20_50; `len()` counts its slides.
 ///
@@ -24,13 +25,16 @@ use crate::work::work;
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Recordings {
     pub(crate) set: Arc<RecordingSet>,
-    measured: OnceLock<Vec<Vec<MeasuredSlide>>>,
+    measured: OnceLock<Arc<Measured>>,
 }
+
+/// What the slides of each texture measure.
+type Measured = Vec<Vec<MeasuredSlide>>;
 
 /// One recorded slide with its samples.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Slide {
-    recording: Recording,
+    recording: Arc<Recording>,
     texture: String,
 }
 
@@ -38,7 +42,7 @@ impl Slide {
     /// A slide over a texture of this name.
     pub(crate) fn new(recording: Recording, texture: &str) -> Self {
         Self {
-            recording,
+            recording: Arc::new(recording),
             texture: texture.to_owned(),
         }
     }
@@ -52,28 +56,21 @@ pub(crate) enum Wanted {
 }
 
 impl Recordings {
-    fn open(folder: &Path) -> PyResult<Self> {
-        Ok(Self {
-            set: Arc::new(RecordingSet::open(folder).map_err(|why| why.raise())?),
-            measured: OnceLock::new(),
-        })
-    }
-
     /// What all slides measure, per texture and in the order of time. They are read and measured once.
-    pub(crate) fn measured(&self, py: Python<'_>) -> PyResult<&[Vec<MeasuredSlide>]> {
-        if self.measured.get().is_none() {
-            let set = &self.set;
+    pub(crate) fn measured(&self, py: Python<'_>) -> PyResult<Arc<Measured>> {
+        if let Some(measured) = self.measured.get() {
+            return Ok(Arc::clone(measured));
+        }
+        let set = Arc::clone(&self.set);
+        let all = work_on_all_cores(py, move |between| {
             let folder = set.folder().display();
             set.sensor()
                 .map_err(|why| why.raise_of(folder.to_string()))?;
-            let all = work(py, |between| {
-                let all = measure_all(set, |_| between());
-                all.map_err(|why| why.raise_of(format!("recordings in {folder}")))
-            })?;
-            // who was first is as good
-            let _ = self.measured.set(all);
-        }
-        Ok(self.measured.get().map_or(&[], Vec::as_slice))
+            let all = measure_all(&set, |_| between());
+            all.map_err(|why| why.raise_of(format!("recordings in {folder}")))
+        })?;
+        // who was first is as good
+        Ok(Arc::clone(self.measured.get_or_init(|| Arc::new(all))))
     }
 
     fn find(&self, wanted: &Wanted) -> PyResult<usize> {
@@ -98,8 +95,18 @@ impl Recordings {
 #[pymethods]
 impl Recordings {
     #[new]
-    fn new(folder: PathBuf) -> PyResult<Self> {
-        Self::open(&folder)
+    fn new(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
+        let set = work(py, move |_| RecordingSet::open(&folder))?;
+        Ok(Self {
+            set: Arc::new(set),
+            measured: OnceLock::new(),
+        })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (PathBuf,))> {
+        // another process may be in another folder
+        let folder = std::path::absolute(self.set.folder())?;
+        Ok((py.get_type::<Self>().into_any(), (folder,)))
     }
 
     /// The folder.
@@ -142,7 +149,8 @@ impl Recordings {
     /// manifest says.
     fn slides(&self, py: Python<'_>, texture: Wanted) -> PyResult<Vec<Slide>> {
         let index = self.find(&texture)?;
-        let slides = work(py, |_| self.set.load_texture(index))?;
+        let set = Arc::clone(&self.set);
+        let slides = work(py, move |_| set.load_texture(index))?;
         let texture = &self.set.textures()[index].name;
         let slides = slides.into_iter().map(|slide| Slide::new(slide, texture));
         Ok(slides.collect())
@@ -153,7 +161,8 @@ impl Recordings {
     /// Raises KeyError and RecordingError as `slides` does.
     fn measured_slides(&self, py: Python<'_>, texture: Wanted) -> PyResult<Vec<Features>> {
         let index = self.find(&texture)?;
-        let slides = self.measured(py)?.get(index);
+        let measured = self.measured(py)?;
+        let slides = measured.get(index);
         let slides = slides.ok_or_else(|| PyIndexError::new_err(index))?;
         Ok(slides.iter().map(Features::from).collect())
     }
@@ -168,7 +177,7 @@ impl Recordings {
     /// Raises RecordingError where a file cannot be read, or a slide has no features; KeyboardInterrupt after Ctrl-C.
     fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let measured = self.measured(py)?;
-        let textures = self.set.textures().iter().zip(measured);
+        let textures = self.set.textures().iter().zip(&*measured);
         let mut material = Vec::new();
         let mut names = Vec::new();
         let mut trial_numbers = Vec::new();
@@ -311,14 +320,12 @@ impl Slide {
 
     /// The `Features` of the slide. Raises SlideError where it has none.
     fn features(&self, py: Python<'_>) -> PyResult<Features> {
-        py.detach(|| {
-            let measured = measure(plan(), &self.recording);
-            let measurement = measured.map_err(|why| why.raise())?;
-            Ok(Features {
-                movement: self.recording.movement,
-                measurement,
-            })
-        })
+        let recording = Arc::clone(&self.recording);
+        work(py, move |_| features_in(&recording))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
+        pickled(py, "_slide", &(&self.texture, &*self.recording))
     }
 
     fn __repr__(&self) -> String {
@@ -336,22 +343,34 @@ impl Slide {
 /// Raises SlideError where one has none, KeyboardInterrupt after Ctrl-C.
 #[pyfunction]
 fn features_of(py: Python<'_>, slides: Vec<Py<Slide>>) -> PyResult<Vec<Features>> {
-    let recordings: Vec<&Recording> = slides.iter().map(|slide| &slide.get().recording).collect();
-    work(py, |between| {
-        let of = |recording: &&Recording| {
+    let recordings = slides.iter().map(|slide| &slide.get().recording);
+    let recordings: Vec<Arc<Recording>> = recordings.map(Arc::clone).collect();
+    work_on_all_cores(py, move |between| {
+        let of = |recording: &Arc<Recording>| {
             between();
-            let measurement = measure(plan(), recording)?;
-            Ok::<_, SlideError>(Features {
-                movement: recording.movement,
-                measurement,
-            })
+            features_in(recording)
         };
         recordings.par_iter().panic_fuse().map(of).collect()
     })
 }
 
+fn features_in(recording: &Recording) -> Result<Features, SlideError> {
+    Ok(Features {
+        movement: recording.movement,
+        measurement: measure(plan(), recording)?,
+    })
+}
+
+/// The `Slide` that was pickled.
+#[pyfunction]
+fn _slide(saved: &str) -> PyResult<Slide> {
+    let (texture, recording): (String, Recording) = unpickled("samples of a slide", saved)?;
+    Ok(Slide::new(recording, &texture))
+}
+
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Recordings>()?;
     module.add_class::<Slide>()?;
+    module.add_function(wrap_pyfunction!(_slide, module)?)?;
     module.add_function(wrap_pyfunction!(features_of, module)?)
 }

@@ -1,6 +1,6 @@
 //! The simulated world: a rig and a hand that slide over textures of Table 1.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -10,9 +10,11 @@ use tactus_lab::sim::collection::{Collection, calibrated, texture_name, texture_
 use tactus_lab::sim::rig::SimRig;
 use tactus_world::textures::TEXTURES;
 
+use crate::error::{Raise as _, SimulationError};
 use crate::features::movement;
 use crate::recordings::Slide;
-use crate::work::work;
+use crate::values::no_pickle;
+use crate::work::{lock, work, work_on_all_cores};
 
 /// A simulated rig with a texture under its finger.
 ///
@@ -22,8 +24,27 @@ use crate::work::work;
 /// Raises KeyError for a texture that Table 1 does not have, SimulationError where the rig does not start.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct SimulatedRig {
-    rig: Mutex<SimRig>,
+    rig: Arc<Mutex<SimRig>>,
+    made_by: u32,
     texture: &'static str,
+}
+
+impl SimulatedRig {
+    /// Does something with the rig as soon as no other thread does.
+    fn with<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        done: impl FnOnce(&mut SimRig) -> PyResult<T> + Send + 'static,
+    ) -> PyResult<T> {
+        let (rig, made_by) = (Arc::clone(&self.rig), self.made_by);
+        work(py, move |between| match lock(&rig, made_by, between) {
+            Some(mut rig) => done(&mut rig),
+            None => Err(SimulationError::new_err(
+                "the rig was at work when this process was forked from the one that made it: make another rig here, or \
+                 start processes with multiprocessing.get_context(\"spawn\")",
+            )),
+        })
+    }
 }
 
 fn number(name: &str) -> PyResult<u8> {
@@ -73,7 +94,7 @@ impl SimulatedRig {
             textures: vec![number],
             trials: 1,
         };
-        let rig = work(py, |_| {
+        let rig = work(py, move |_| {
             let calibration = calibrated(world.setup_with(finger, number, 0))?;
             let mut rig = SimRig::new(world.setup_with(finger, number, trial));
             // these constants are the ones it measured
@@ -81,7 +102,8 @@ impl SimulatedRig {
             rig.home().map(|()| rig)
         })?;
         Ok(Self {
-            rig: Mutex::new(rig),
+            rig: Arc::new(Mutex::new(rig)),
+            made_by: std::process::id(),
             texture: texture_name(number),
         })
     }
@@ -94,12 +116,8 @@ impl SimulatedRig {
 
     /// Time of the rig, s.
     #[getter]
-    fn time_s(&self, py: Python<'_>) -> f64 {
-        // a slide may be under way on another thread
-        py.detach(|| {
-            let rig = self.rig.lock().unwrap_or_else(PoisonError::into_inner);
-            rig.now().as_secs_f64()
-        })
+    fn time_s(&self, py: Python<'_>) -> PyResult<f64> {
+        self.with(py, |rig| Ok(rig.now().as_secs_f64()))
     }
 
     /// Presses with so many newtons, slides with so many mm/s, and lifts: the `Slide`, with its samples.
@@ -107,11 +125,17 @@ impl SimulatedRig {
     /// Raises SlideError for a movement that no rig makes, SimulationError for a fault of the rig.
     fn slide(&self, py: Python<'_>, force_n: f32, speed_mm_s: f32) -> PyResult<Slide> {
         let movement = movement(force_n, speed_mm_s)?;
-        let slide = work(py, |_| {
-            let mut rig = self.rig.lock().unwrap_or_else(PoisonError::into_inner);
-            rig.record(movement)
+        let slide = self.with(py, move |rig| {
+            rig.record(movement).map_err(|why| why.raise())
         })?;
         Ok(Slide::new(slide, self.texture))
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        no_pickle(
+            "tactus.SimulatedRig",
+            "make another one with the same texture, seed and trial",
+        )
     }
 
     fn __repr__(&self) -> String {
@@ -138,12 +162,15 @@ fn simulate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
     let first = collection.textures[0];
-    let calibration = work(py, |_| calibrated(collection.setup_with(finger, first, 0)))?;
-    let recorded = work(py, |between| {
-        collection.record_with(finger, calibration, between)
+    let numbers = collection.textures.clone();
+    let recorded = work_on_all_cores(py, move |between| {
+        let calibration =
+            calibrated(collection.setup_with(finger, first, 0)).map_err(|why| why.raise())?;
+        let all = collection.record_with(finger, calibration, between);
+        all.map_err(|why| why.raise())
     })?;
     let all = PyDict::new(py);
-    for (slides, &number) in recorded.into_iter().zip(&collection.textures) {
+    for (slides, &number) in recorded.into_iter().zip(&numbers) {
         let name = texture_name(number);
         let slides: Vec<Slide> = slides.into_iter().map(|s| Slide::new(s, name)).collect();
         all.set_item(name, slides)?;

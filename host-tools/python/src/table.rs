@@ -9,7 +9,7 @@ use tactus_core::explorer;
 use tactus_core::features::Movement;
 use tactus_core::table::{FALSE_ALARM, Table as Read};
 use tactus_lab::data::recordings::files::open;
-use tactus_lab::data::table_file::read_table;
+use tactus_lab::data::table_file::{TableFileError, read_table};
 use tactus_lab::data::whole::write_whole;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::first::{FirstError, learn_first};
@@ -21,7 +21,7 @@ use crate::error::Raise as _;
 use crate::features::Features;
 use crate::recordings::Recordings;
 use crate::values::object;
-use crate::work::work;
+use crate::work::{work, work_on_all_cores};
 
 /// A texture table: what is known of every texture at every movement. `len()` counts its textures, `bytes()` is its
 /// file.
@@ -77,11 +77,10 @@ impl Table {
         let method = arguments::method(method)?;
         let features = arguments::features(features)?;
         let expected = expected(drift, false_alarm)?;
-        let (set, measured) = (&recordings.set, recordings.measured(py)?);
-        let learn = |_: &(dyn Fn() + Sync)| {
-            learn_first(set, measured, train_slides, method, features, &expected)
-        };
-        Self::of(work(py, learn)?)
+        let (set, measured) = (Arc::clone(&recordings.set), recordings.measured(py)?);
+        Self::of(work_on_all_cores(py, move |_| {
+            learn_first(&set, &measured, train_slides, method, features, &expected)
+        })?)
     }
 
     /// Learns a table from features of one's own: a dict from the name of each texture to its list of `Features`. Each
@@ -124,18 +123,19 @@ impl Table {
             }
             observed.push(row);
         }
-        let learn = |_: &(dyn Fn() + Sync)| {
+        Self::of(work_on_all_cores(py, move |_| {
             learn_for(&expected, method, features, &names, &movements, &observed)
-        };
-        Self::of(work(py, learn)?)
+        })?)
     }
 
     /// Reads a file that `save` or `tactus learn` wrote, with every check of it. Raises TableError.
     #[staticmethod]
-    fn load(path: PathBuf) -> PyResult<Self> {
-        let mut bytes = Vec::new();
-        read_table(&path, open(&path), &mut bytes).map_err(|why| why.raise())?;
-        Self::of(bytes)
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Self::of(work(py, move |_| {
+            let mut bytes = Vec::new();
+            read_table(&path, open(&path), &mut bytes)?;
+            Ok::<_, TableFileError>(bytes)
+        })?)
     }
 
     /// The table in these bytes, with every check of it. Raises TableError.
@@ -147,8 +147,9 @@ impl Table {
     }
 
     /// Writes the table; a file of that name is replaced whole or not at all. Raises OSError.
-    fn save(&self, path: PathBuf) -> PyResult<()> {
-        Ok(write_whole(&path, &self.bytes)?)
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let bytes = Arc::clone(&self.bytes);
+        work(py, move |_| write_whole(&path, &bytes).map_err(PyErr::from))
     }
 
     /// What `tactus table FILE --format json` prints, as a dict: movements, textures, and what is known of each.
@@ -190,6 +191,14 @@ impl Table {
         Ok(format!("{:08x}", self.read()?.crc()))
     }
 
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let read = py.import("tactus._tactus")?.getattr("_table")?;
+        Ok((read, (self.__bytes__(py),)))
+    }
+
     fn __bytes__<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.bytes)
     }
@@ -209,6 +218,13 @@ impl Table {
     }
 }
 
+/// The `Table` that was pickled.
+#[pyfunction]
+fn _table(saved: &[u8]) -> PyResult<Table> {
+    Table::from_bytes(saved)
+}
+
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(_table, module)?)?;
     module.add_class::<Table>()
 }

@@ -1,6 +1,7 @@
 """A probe in Python at the other end: it knows the messages from docs/src/wire.json alone."""
 
 import os
+import pickle
 import signal
 import socket
 import subprocess
@@ -186,6 +187,63 @@ def test_ctrl_c_stops_the_rig():
     assert (run.returncode, out) == (0, "stopped, Ready\n")
     # it asks where the finger is until that is lifted
     assert [name for name, _ in probe.asked][:4] == ["Identify", "Stop", "Stream", "Status"]
+
+
+CTRL_C_TWICE = """
+import sys, tactus
+try:
+    with tactus.Probe(sys.argv[1], timeout_s=60) as probe:
+        for report in getattr(probe, sys.argv[2])() if sys.argv[2] == "identify" else iter(probe.status, None):
+            print("chosen", flush=True)
+except KeyboardInterrupt:
+    print("left", flush=True)
+"""
+
+
+@pytest.mark.parametrize("call", ["identify", "status"])
+def test_ctrl_c_twice_does_not_wait_for_a_probe_that_does_not_stop(call):
+    status = [{"Status": STATUS}, "for ever"]
+    probe = Probe(Identify=[chosen(1), "for ever"], Stop=["for ever"], Status=status if call == "status" else [])
+    run = [sys.executable, "-c", CTRL_C_TWICE, probe.port, call]
+    with subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        try:
+            while not probe.asked:
+                time.sleep(0.05)
+            for _ in range(2):
+                time.sleep(0.5)
+                run.send_signal(signal.SIGINT)
+            out, err = run.communicate(timeout=10)
+        finally:
+            run.kill()
+    assert (run.returncode, out.splitlines()[-1], err) == (0, "left", "")
+
+
+def test_a_forked_process_leaves_the_probe_alone():
+    probe = Probe(Identify=[chosen(1), "for ever"])
+    with tactus.Probe(probe.port) as ours:
+        events = ours.identify()
+        next(events)
+        child = os.fork()
+        if child == 0:
+            said = []
+            for ask in ours.status, events.close, ours.stop, lambda: next(events):
+                try:
+                    ask()
+                except tactus.ProbeError as why:
+                    said.append('"spawn"' in str(why))
+            ours.close()
+            os._exit(0 if said == [True] * 4 else 1)
+        assert os.waitpid(child, 0)[1] == 0
+        assert [name for name, _ in probe.asked] == ["Identify"]
+        events.close()
+        assert ours.status()["phase"] == "Ready"
+
+
+def test_what_has_a_port_is_not_pickled():
+    with tactus.Probe(Probe(Identify=[chosen(1)]).port) as ours:
+        for thing in ours, ours.identify():
+            with pytest.raises(TypeError, match="cannot be pickled or copied: "):
+                pickle.dumps(thing)
 
 
 def test_a_log_of_the_command_is_read(command, tmp_path):

@@ -14,6 +14,7 @@ use clap::{Args, ValueEnum};
 use crate::shell::{hear, root, run};
 use crate::{emulate, firmware, page};
 pub(crate) use factory::{FOLDER, TABLES};
+pub(crate) use fuzz::limits;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -70,8 +71,8 @@ enum Part {
     BoardFaults,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
     Press,
-    /// libFuzzer against frames, tables, the store's flash and recordings, on stable Rust; wants a C++
-    /// compiler
+    /// libFuzzer against frames, tables, the store's flash, recordings, samples, logs and the page's probe, on stable
+    /// Rust; wants a C++ compiler
     Fuzz,
 }
 

@@ -27,7 +27,7 @@ use clap::Parser;
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 enum Cli {
-    /// Run the quick checks: formatting, lints, and the unit tests of core and lab
+    /// Run the quick checks: formatting, lints, licences, and the unit tests of core and lab
     ///
     /// For every day; `cargo xtask test` is the whole check.
     Check,
@@ -42,7 +42,7 @@ enum Cli {
     /// TACTUS_TOOLCHAIN=debian or TACTUS_TOOLCHAIN=active asks for one of them. The last line names the compiler that
     /// made them.
     Test {
-        /// Run this step only, in this process
+        /// Run this step only, in this process; `fuzz` is one that does not run otherwise
         #[arg(long, value_name = "NAME")]
         step: Option<String>,
     },

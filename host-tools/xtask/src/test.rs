@@ -1,6 +1,7 @@
 //! `cargo xtask test`: every check, and a summary of what ran. `cargo xtask check`: the quick checks.
 use std::fmt::Write as _;
 use std::fs::File;
+use std::iter;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -8,9 +9,9 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 
 use crate::emulate::{emulator, workspace};
-use crate::shell::{SKIP_LOG, cargo, has_subcommand, hear, root, run, target};
+use crate::shell::{SKIP_LOG, cargo, has_subcommand, hear, root, run, skip, target};
 use crate::toolchain::{self, CHIP};
-use crate::{bench, emulate, firmware, page, python, size};
+use crate::{bench, campaign, emulate, firmware, page, python, size};
 
 /// A check, which runs in a process of its own: `cargo xtask test --step NAME`.
 type Step = (&'static str, fn() -> Result<()>);
@@ -31,9 +32,11 @@ const ROWS: [&[Step]; 2] = [
         ("python", python::check),
         ("bench", bench::gates),
         ("size", size::gates),
-        ("licences and sources", licences),
+        ("licences", licences),
     ],
 ];
+/// Steps that run where they are asked for only: what they build takes longer than what they find.
+const OTHER_STEPS: &[Step] = &[("fuzz", campaign::limits)];
 /// Workspaces beside the main one.
 pub(crate) const OTHERS: [&str; 3] = ["host-tools/page", "host-tools/python", "tests/fuzz"];
 
@@ -64,13 +67,33 @@ fn documentation() -> Result<()> {
     announce(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
 }
 
+/// Checks every workspace with cargo-deny.
 fn licences() -> Result<()> {
     if !has_subcommand("deny") {
         let why = "cargo-deny is not installed (cargo install cargo-deny --locked)";
-        return crate::shell::skip("licences and sources", why);
+        return skip("licences, sources and advisories", why);
     }
-    // advisories would need the network
-    announce(cargo().args(["deny", "check", "bans", "licenses", "sources"]))
+    let deny = |folder: &str, task: &[&str]| {
+        let mut deny = cargo();
+        deny.args(["deny", "--workspace", "--manifest-path"]);
+        deny.arg(root().join(folder).join("Cargo.toml"));
+        deny.args(task)
+            .arg("--config")
+            .arg(root().join("deny.toml"));
+        deny
+    };
+    let mut kinds = vec!["bans", "licenses", "sources"];
+    match announce(deny("", &["fetch"]).arg("db")) {
+        Ok(()) => kinds.push("advisories"),
+        Err(_) => skip(
+            "advisories",
+            "cargo-deny cannot fetch their database: is there a network?",
+        )?,
+    }
+    for folder in iter::once("").chain(OTHERS) {
+        announce(deny(folder, &["check", "--disable-fetch"]).args(&kinds))?;
+    }
+    Ok(())
 }
 
 fn board() -> Result<()> {
@@ -109,15 +132,20 @@ fn failures(lines: &[String]) -> String {
 
 /// Runs one step here.
 pub(crate) fn one(name: &str) -> Result<()> {
-    let step = ROWS.concat().into_iter().find(|(step, _)| *step == name);
-    let (_, check) = step.with_context(|| format!("there is no step {name:?}"))?;
+    let steps = [&ROWS.concat(), OTHER_STEPS].concat();
+    let step = steps.iter().find(|(step, _)| *step == name);
+    let (_, check) = step.with_context(|| {
+        let names: Vec<&str> = steps.iter().map(|(name, _)| *name).collect();
+        format!("there is no step {name:?}; there are {}", names.join(", "))
+    })?;
     check()
 }
 
-/// Formatting, lints and unit tests.
+/// Formatting, lints, licences and unit tests.
 pub(crate) fn check() -> Result<()> {
     formatting()?;
     lints()?;
+    licences()?;
     let mut unit_tests = cargo();
     unit_tests.args(["test", "--lib", "--no-fail-fast"]);
     for package in ["core", "link", "world", "lab"] {

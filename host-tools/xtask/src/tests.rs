@@ -63,6 +63,36 @@ fn a_workflow_is_steps_of_one_job() {
 }
 
 #[test]
+fn every_workspace_is_linted_and_licensed() {
+    let mut git = std::process::Command::new("git");
+    git.args(["ls-files", "*Cargo.lock"])
+        .current_dir(shell::root());
+    let listed = String::from_utf8(git.output().unwrap().stdout).unwrap();
+    let others = listed
+        .lines()
+        .filter_map(|lock| lock.strip_suffix("/Cargo.lock"));
+    assert_eq!(others.collect::<Vec<_>>(), test::OTHERS);
+}
+
+#[test]
+fn the_security_page_names_every_file_with_unsafe_code() {
+    let mut git = std::process::Command::new("git");
+    let code = "^[^/\"]*(unsafe (\\{|fn |impl |extern )|#\\[unsafe\\()";
+    git.args(["grep", "-lE", code, "--", "*.rs"])
+        .current_dir(shell::root());
+    let listed = String::from_utf8(git.output().unwrap().stdout).unwrap();
+    let page = text("SECURITY.md");
+    let files: Vec<&str> = listed.lines().collect();
+    for file in &files {
+        assert!(page.contains(&format!("`{file}`")), "{file}");
+    }
+    let named = page.split('`').filter(|word| word.ends_with(".rs"));
+    for file in named {
+        assert!(files.contains(&file), "{file} has none");
+    }
+}
+
+#[test]
 fn the_version_is_the_same_everywhere() {
     let version = env!("CARGO_PKG_VERSION");
     let has = |file: &str, line: &str| assert!(text(file).contains(line), "{file}: {line}");

@@ -238,6 +238,13 @@ pub struct Spectrum {
     psd: [f32; BINS],
 }
 
+/// A spectrum of these powers, in counts^2 per bin: one that was kept somewhere.
+impl From<[f32; BINS]> for Spectrum {
+    fn from(psd: [f32; BINS]) -> Self {
+        Self { psd }
+    }
+}
+
 impl Spectrum {
     /// Power of every bin; bin k is at `k * BIN_HZ`.
     pub fn psd(&self) -> &[f32; BINS] {

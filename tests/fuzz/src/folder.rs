@@ -89,7 +89,8 @@ fn read(data: &[u8]) -> Result<(), String> {
 fn opened(folder: &Path) -> Result<(), RecordingError> {
     let set = RecordingSet::open(folder)?;
     for texture in 0..set.textures().len().min(4) {
-        for slide in set.load_texture(texture)? {
+        // a thousand are as good as more
+        for slide in set.load_texture(texture)?.into_iter().take(1000) {
             let (steady, pac) = (slide.steady(2200), slide.pac());
             assert!(steady.end <= pac.len(), "the steady part lies in it");
             let plan = tactus_core::dsp::Plan::new();
@@ -118,6 +119,29 @@ impl Drop for Folder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
+}
+
+/// Manifests of so many bytes that are right: every row another texture, or every row another slide of one.
+pub fn many_rows(bytes: usize) -> Vec<Vec<u8>> {
+    let seeds = seeds();
+    let at = seeds[0].windows(RULE.len()).position(|w| w == RULE);
+    let (manifest, file) = seeds[0].split_at(at.expect("our own seed"));
+    let manifest = std::str::from_utf8(manifest).expect("our own text");
+    let mut lines = manifest.lines();
+    let (head, row) = (
+        lines.next().unwrap_or_default(),
+        lines.next().unwrap_or_default(),
+    );
+    let rest = row.strip_prefix("3,felt,1,").expect("our own row");
+    let of = |begins: fn(usize) -> String| {
+        let rows = (1..=bytes / (row.len() + 10)).map(|n| format!("{}{rest}\n", begins(n)));
+        let text = rows.fold(format!("{head}\n"), |text, row| text + &row);
+        [text.as_bytes(), file].concat()
+    };
+    vec![
+        of(|n| format!("{n},felt {n},1,")),
+        of(|n| format!("3,felt,{n},")),
+    ]
 }
 
 /// Folders that are whole, one of each kind.

@@ -6,6 +6,7 @@
 
 mod flash;
 mod folder;
+pub mod memory;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use embassy_futures::block_on;
@@ -17,11 +18,14 @@ use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{SelfLearnedRecord, Store};
 use tactus_core::table::{Change, Table, amend};
-use tactus_core::wire::{Command, Event, MAX_FRAME, Receiver, Request};
+use tactus_core::wire::{Command, Event, MAX_FRAME, Receiver, Report, Request};
+use tactus_lab::data::recordings::npy;
 use tactus_lab::eval::learn::know_lengths;
+use tactus_lab::remote::Remote;
+use tactus_link::log::{Line, TableParts};
 
 pub use flash::{Flash, images};
-pub use folder::recordings;
+pub use folder::{many_rows, recordings};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// More textures than any table for the probe has.
@@ -97,6 +101,46 @@ fn cobs_of(bytes: &[u8]) -> Vec<u8> {
     let length = cobs::encode(bytes, &mut buffer);
     buffer.truncate(length);
     buffer
+}
+
+/// A session's log.
+pub fn log(data: &[u8]) {
+    let mut tables = TableParts::default();
+    // whatever is wrong with it: what comes before that is used
+    let _ = tactus_link::log::read(data, |line| {
+        if let Line::Report(report) = &line
+            && let Event::TablePart {
+                offset,
+                length,
+                bytes,
+            } = &report.event
+        {
+            drop(tables.take(*offset, *length, bytes));
+        }
+    });
+}
+
+/// A file of samples, and what is in it as P_AC.
+pub fn samples(data: &[u8]) {
+    if let Ok(samples) = npy::read(data) {
+        let file = npy::write(&samples);
+        assert_eq!(npy::read(&file), Ok(samples), "what is read is written");
+    }
+}
+
+/// What comes from the line of a page's probe, while the page asks for something.
+pub fn page(data: &[u8]) {
+    let mut remote = Remote::default();
+    remote.ask(r#"{"do":"connect","port":"fuzz","now_ms":0}"#);
+    for (now, part) in (1..).zip(data.chunks(4096)) {
+        let received = serde_json::to_string(part).expect("numbers");
+        let reply = remote.ask(&format!(
+            r#"{{"do":"step","now_ms":{},"received":{received}}}"#,
+            20 * now
+        ));
+        assert!(serde_json::from_str::<serde_json::Value>(&reply).is_ok());
+    }
+    remote.ask(r#"{"do":"closed"}"#);
 }
 
 /// A texture table: read, explored, and amended.
@@ -218,7 +262,8 @@ pub fn store(data: &[u8]) {
     // whatever has changed, the store goes on
     let _ = block_on(store.mend());
     let mut buffer = vec![0; Store::<Flash>::MAX_TABLE];
-    for step in todo.as_chunks::<2>().0 {
+    // more say nothing new
+    for step in todo.as_chunks::<2>().0.iter().take(1000) {
         used(&mut store, *step, &mut buffer);
     }
     let before = said(&mut store, &mut buffer);
@@ -314,8 +359,25 @@ pub fn write_seeds(target: &str) {
     std::process::exit(0);
 }
 
+/// A target: its name, and what it does with bytes.
+pub type Target = (&'static str, fn(&[u8]));
+
+/// All targets.
+pub const TARGETS: [Target; 7] = [
+    ("wire", wire),
+    ("table", table),
+    ("store", store),
+    ("recordings", recordings),
+    ("log", log),
+    ("samples", samples),
+    ("page", page),
+];
+
 /// Inputs that are right, made anew so that they stay so.
-fn seeds(target: &str) -> Vec<Vec<u8>> {
+///
+/// # Panics
+/// There is no such target.
+pub fn seeds(target: &str) -> Vec<Vec<u8>> {
     let behind = |mode: u8, bytes: &[u8]| [&[mode], bytes].concat();
     match target {
         "wire" => {
@@ -366,6 +428,33 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
             .map(|image| vec![image, 1, 0, 9, 4, 0, 3, 2, 1, 3, 7, 1, 0, 6, 0, 4, 0])
             .collect(),
         "recordings" => folder::seeds(),
+        "log" => vec![
+            concat!(
+                r#"{"session":{"tactus":"0.2.0","protocol":PROTOCOL,"port":"x"}}"#,
+                "\n",
+                r#"{"command":"Status"}"#,
+                "\n",
+                r#"{"report":{"number":1,"at_ms":50,"event":{"Done":1}}}"#,
+                "\n"
+            )
+            .replace("PROTOCOL", &tactus_core::wire::PROTOCOL.to_string())
+            .into_bytes(),
+        ],
+        "samples" => vec![npy::write(&(0..500).collect::<Vec<i16>>())],
+        "page" => {
+            let mut frames = Vec::new();
+            for (number, event) in (0..).zip([Event::Done(1), Event::Done(2)]) {
+                let mut buffer = [0; MAX_FRAME + 1];
+                let report = Report {
+                    number,
+                    at_ms: 50,
+                    event,
+                };
+                let frame = tactus_core::wire::encode(&report, &mut buffer);
+                frames.extend_from_slice(frame.expect("room for a frame"));
+            }
+            vec![frames]
+        }
         other => panic!("no target {other}"),
     }
 }

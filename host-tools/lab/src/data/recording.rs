@@ -1,5 +1,6 @@
 //! One recorded slide: the movement that made it, its blocks of samples, and what no block has.
 
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use tactus_core::features::{Block, Movement, Slide};
 use tactus_core::sensor::FingerCode;
@@ -12,7 +13,7 @@ pub const PAC_RATE_HZ: u32 = RATE_HZ;
 const SHEAR_HZ: u32 = 1000;
 
 /// One slide over one texture.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Recording {
     /// Index of the texture in [`RecordingSet::textures`](crate::data::recordings::RecordingSet::textures).
     pub texture: usize,

@@ -2,6 +2,7 @@
 
 Recordings become features, features a table, and a table explores. All arrays that come out are read-only numpy arrays. What goes
 wrong is a `TactusError` with the sentence of the command line. Long work releases the interpreter's lock, and Ctrl-C ends it.
+It works in processes that were forked, too; `Recordings`, `Slide`, `Features` and `Table` can be pickled.
 """
 
 from . import _tactus

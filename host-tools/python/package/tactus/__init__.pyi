@@ -4,6 +4,9 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Seque
 import numpy as np
 from numpy.typing import NDArray
 
+# counts that 16 bits hold
+_Samples = Union[NDArray[np.integer[Any]], Sequence[int]]
+
 __version__: str
 TEXTURES: List[str]
 
@@ -54,16 +57,16 @@ class Features:
     def pdc(self) -> Optional[Tuple[float, float]]: ...
 
 def features(
-    pac: NDArray[np.int16],
+    pac: _Samples,
     *,
     window_s: Tuple[float, float],
     force_n: float,
     speed_mm_s: float,
-    still: Optional[NDArray[np.int16]] = None,
+    still: Optional[_Samples] = None,
     background: Optional[float] = None,
-    shear_mn: Optional[NDArray[np.int16]] = None,
+    shear_mn: Optional[_Samples] = None,
     shear_rate_hz: int = 100,
-    pdc: Optional[NDArray[np.int16]] = None,
+    pdc: Optional[_Samples] = None,
     pdc_rate_hz: int = 100,
 ) -> Features: ...
 

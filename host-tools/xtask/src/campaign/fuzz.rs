@@ -10,7 +10,15 @@ use clap::Parser;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain;
 
-const TARGETS: [&str; 4] = ["wire", "table", "store", "recordings"];
+const TARGETS: [&str; 7] = [
+    "wire",
+    "table",
+    "store",
+    "recordings",
+    "log",
+    "samples",
+    "page",
+];
 const MAX_LEN: usize = 8192;
 
 /// Attacks the parsers.
@@ -49,6 +57,16 @@ pub(super) fn fuzz(options: &[OsString]) -> Result<String> {
     Ok(format!("Nothing broke: {}.", lines.join(", ")))
 }
 
+/// Attacks every target for some seconds and with 10 MB, with limits of time and memory: without libFuzzer, and with
+/// the same inputs every time.
+pub(crate) fn limits() -> Result<()> {
+    let mut limits = cargo();
+    limits.current_dir(root().join("tests/fuzz"));
+    limits.args(["run", "--release", "--locked", "--target-dir"]);
+    limits.arg(target().join("fuzz"));
+    run(limits.args(["--bin", "limits", "--", "4"]))
+}
+
 fn build() -> Result<PathBuf> {
     let runs = |program: &&str| Command::new(program).arg("--version").output().is_ok();
     ensure!(
@@ -58,7 +76,8 @@ fn build() -> Result<PathBuf> {
     let (host, folder) = (toolchain::host()?, target().join("fuzz"));
     let mut build = cargo();
     build.current_dir(root().join("tests/fuzz"));
-    build.args(["build", "--release", "--locked", "--target", &host]);
+    build.args(["build", "--release", "--locked", "--features", "libfuzzer"]);
+    build.args(["--target", &host]);
     build.arg("--target-dir").arg(&folder);
     let coverage = [
         "level=4",
@@ -96,7 +115,7 @@ fn attack(programs: &Path, name: &str, options: &Options) -> Result<(String, Opt
     fuzzer.arg(format!("-artifact_prefix={}", broken.display()));
     fuzzer.args([
         "-seed=1",
-        "-timeout=20",
+        "-timeout=10",
         "-rss_limit_mb=1024",
         "-print_final_stats=1",
     ]);
