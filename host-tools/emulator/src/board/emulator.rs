@@ -25,7 +25,6 @@ use super::options::Options;
 use super::pins::{self, PinId};
 use super::referee::{Referee, Violation};
 use super::rig::{Rig, SharedRig, lock};
-use super::stack::{Stack, StackLayout, StackUse};
 use super::symbols::symbols;
 use super::timing::Timing;
 use super::upset::Switch;
@@ -78,7 +77,6 @@ impl Emulator {
             commands: commanded,
             reached: reaches,
             log,
-            stack: None,
             profiler: None,
             timing: Timing::default(),
             instructions: 0,
@@ -458,20 +456,6 @@ impl Emulator {
     /// Punctuality of slots and servo since the last call.
     pub(crate) fn timing(&mut self) -> Result<Timing, Error> {
         self.with(|standing| std::mem::take(&mut standing.driver.timing))
-    }
-
-    /// Measures the depth of the stack from now on. To be called at time 0: it paints the whole stack. Costs most of
-    /// the speed.
-    pub(crate) fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
-        self.with(|standing| standing.driver.stack = Some(Stack::new(layout, standing.host)))
-    }
-
-    /// The use of the stack since [`Emulator::measure_stack`]; `None` without it.
-    pub(crate) fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
-        self.with(|standing| {
-            let stack = standing.driver.stack.as_mut();
-            stack.map(|stack| stack.found(standing.host))
-        })
     }
 
     /// The address and the size, in bytes, of the one symbol that has `name` as its path or in it.
