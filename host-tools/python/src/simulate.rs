@@ -55,11 +55,7 @@ fn collection(textures: Option<Vec<String>>, trials: u32, seed: u64) -> PyResult
             "textures: one at least; trials: 1 to 1000",
         ));
     }
-    Ok(Collection {
-        seed,
-        textures: numbers,
-        trials,
-    })
+    Ok(Collection::new(seed, numbers, trials))
 }
 
 #[pymethods]
@@ -68,14 +64,10 @@ impl SimulatedRig {
     #[pyo3(signature = (texture, *, seed=1, trial=1, finger="biotac"))]
     fn new(py: Python<'_>, texture: &str, seed: u64, trial: u64, finger: &str) -> PyResult<Self> {
         let (number, finger) = (number(texture)?, finger_named(finger)?);
-        let world = Collection {
-            seed,
-            textures: vec![number],
-            trials: 1,
-        };
+        let world = Collection::new(seed, vec![number], 1).touched_by(finger);
         let rig = work(py, |_| {
-            let calibration = calibrated(world.setup_with(finger, number, 0))?;
-            let mut rig = SimRig::new(world.setup_with(finger, number, trial));
+            let calibration = calibrated(world.setup(number, 0))?;
+            let mut rig = SimRig::new(world.setup(number, trial));
             // these constants are the ones it measured
             rig.control().calibrate(calibration)?;
             rig.home().map(|()| rig)
@@ -136,12 +128,10 @@ fn simulate<'py>(
     seed: u64,
     finger: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
+    let collection = collection(textures, trials, seed)?.touched_by(finger_named(finger)?);
     let first = collection.textures[0];
-    let calibration = work(py, |_| calibrated(collection.setup_with(finger, first, 0)))?;
-    let recorded = work(py, |between| {
-        collection.record_with(finger, calibration, between)
-    })?;
+    let calibration = work(py, |_| calibrated(collection.setup(first, 0)))?;
+    let recorded = work(py, |between| collection.record(calibration, between))?;
     let all = PyDict::new(py);
     for (slides, &number) in recorded.into_iter().zip(&collection.textures) {
         let name = texture_name(number);

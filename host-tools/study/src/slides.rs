@@ -85,11 +85,7 @@ pub struct Session<'a> {
 
 impl StudyWorld {
     fn collection(self) -> Collection {
-        Collection {
-            seed: self.seed,
-            textures: Vec::new(),
-            trials: 0,
-        }
+        Collection::new(self.seed, Vec::new(), 0)
     }
 
     /// The calibration that the rigs of this world share.

@@ -48,11 +48,7 @@ pub const REST_S: u64 = 120;
 
 /// The world that the table of the firmware is learned from.
 pub fn world() -> Collection {
-    Collection {
-        seed: 1,
-        textures: (1..=117).collect(),
-        trials: 5,
-    }
+    Collection::new(1, (1..=117).collect(), 5)
 }
 
 /// The request to the probe.
