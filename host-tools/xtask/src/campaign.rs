@@ -62,8 +62,6 @@ enum Part {
     Rig,
     /// Explorations by the handheld on the emulated board, in a hand that differs from seed to seed
     Handheld,
-    /// Power cuts at every word that the firmware stores
-    Cuts,
     /// The PC's simulated rig, which breaks at any moment of whatever its probe does
     Faults,
     /// The same on emulated boards, with the firmware
@@ -174,7 +172,6 @@ fn perform(part: Part, options: &Options) -> Result<String> {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
         (Part::Page, _) => page::emulated().map(|()| "passed".into()),
         (Part::Tests, _) => left_out(),
-        (Part::Cuts, _) => result(&mut emulate::command("cuts", &options.options)?),
         (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
         (Part::Press, Some(seeds)) => seeds::presses(&seeds),

@@ -167,7 +167,8 @@ impl Rig {
         &self.display
     }
 
-    pub(crate) fn display_mut(&mut self) -> &mut Display {
+    /// The same, to pull its plug.
+    pub fn display_mut(&mut self) -> &mut Display {
         &mut self.display
     }
 

@@ -6,10 +6,8 @@ use crate::board;
 use crate::host::exploration::ExploreError;
 use crate::host::talk::TalkError;
 use crate::host::under_finger::UnderFingerError;
-use crate::scenario::PlayError;
 
 use super::bench::error::BenchError;
-use super::cuts::CutError;
 
 /// Why a run did not come to its end.
 #[derive(Debug, thiserror::Error)]
@@ -28,16 +26,12 @@ pub(crate) enum RunError {
     Print(#[from] std::io::Error),
     #[error("cannot listen on port {port}: {source}. Is it in use? 0 takes any free one")]
     Listen { port: u16, source: std::io::Error },
-    #[error("power cuts: {0}")]
-    Cut(#[from] CutError),
     #[error("the simulated rig of the PC: {0}")]
     Rig(#[from] SimError),
     #[error(transparent)]
     Bench(#[from] BenchError),
-    #[error(transparent)]
-    Play(#[from] PlayError),
     #[error("the exploration had no slide: the stack that was measured says nothing")]
     NoSlide,
-    #[error("the display has no verdict in its headline")]
+    #[error("the display shows no verdict")]
     NoVerdict,
 }

@@ -4,7 +4,7 @@ use clap::Args as Arguments;
 use serde_json::json;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Counts, Event};
-use tactus_lab::sim::scenario::{Scenario, Step, texture};
+use tactus_lab::sim::collection::{Collection, texture_name, texture_number};
 use tactus_link::Session;
 use tactus_world::person::Manner;
 use tactus_world::textures::TEXTURES;
@@ -12,8 +12,9 @@ use tactus_world::textures::TEXTURES;
 use super::error::RunError;
 use crate::board::{Display, Emulator, Error};
 use crate::host::args::{Firmware, Format};
+use crate::host::hand::{Holder, SLIDE_S, Seen};
 use crate::host::milestones::Milestones;
-use crate::scenario::{self, PlayError, Seen};
+use crate::host::under_finger::UnderFingerError;
 
 /// The firmware's table is of this world.
 const WORLD: u64 = 1;
@@ -26,6 +27,8 @@ const SLIDES: u32 = 40;
 const MEAN_NS: u64 = 100_000_000;
 /// Until then the status is here.
 const ANSWERED_MS: u64 = 200;
+/// Time by which the firmware hears its host, s.
+const BOOTED_S: f64 = 0.5;
 /// Letters that the rows below a headline have at most: longer texts are headlines.
 const ROW: usize = 11;
 /// Letters of a headline in the smallest font, and of a name before its question mark.
@@ -51,7 +54,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     finger: FingerName,
     /// How long the hand slides each time, s
-    #[arg(long, value_name = "S", default_value_t = Step::EXPLORED_S, value_parser = slide_s)]
+    #[arg(long, value_name = "S", default_value_t = SLIDE_S, value_parser = slide_s)]
     slide_s: f64,
     /// For people, or a line of JSON at the end for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
@@ -59,23 +62,21 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    fn scenario(&self, truth: &str) -> Scenario {
-        Scenario {
-            about: "an exploration".to_owned(),
-            texture: truth.to_owned(),
-            world: WORLD,
-            seed: self.seed,
-            hand: Manner {
-                // the hand holds it level
-                tilt_mm: self.motion.then_some(0.0),
-                ..Manner::default()
-            },
-            step: vec![Step::Explore {
-                force_n: FORCE_N,
-                pace_mm_s: PACE_MM_S,
-                slides: SLIDES,
-                seconds: self.slide_s,
-            }],
+    /// Has a hand explore this texture, whose host sends these bytes once it is heard.
+    fn explore(&self, texture: u8, host: &[u8]) -> Result<Holder, RunError> {
+        let collection = Collection::new(WORLD, Vec::new(), 1).touched_by(self.finger);
+        let setup = collection.setup(texture, 100 * self.seed);
+        let hand = Manner {
+            // the hand holds it level
+            tilt_mm: self.motion.then_some(0.0),
+            ..Manner::default()
+        };
+        let mut holder = Holder::start(&self.firmware.elf, setup, hand, None)?;
+        holder.wait(BOOTED_S)?;
+        holder.board.send(host);
+        match holder.explore(FORCE_N, PACE_MM_S, SLIDES, self.slide_s)? {
+            true => Ok(holder),
+            false => Err(RunError::NoVerdict),
         }
     }
 }
@@ -99,14 +100,14 @@ enum VerdictKind {
 pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let text = args.format == Format::Text;
     let sha256 = args.firmware.show(text)?;
-    let truth = match &args.texture {
+    let number = match &args.texture {
         Some(name) => {
-            let number = texture(name).map_err(PlayError::from)?;
-            TEXTURES[usize::from(number) - 1].name
+            texture_number(name).ok_or_else(|| UnderFingerError::NoTexture(name.clone()))?
         }
         // neighbours of the table are alike
-        None => TEXTURES[(args.seed * 31) as usize % TEXTURES.len()].name,
+        None => TEXTURES[(args.seed * 31) as usize % TEXTURES.len()].number,
     };
+    let truth = texture_name(number);
     if text {
         println!(
             "An unknown texture in a hand. Under the finger: {truth} (seed {}).",
@@ -117,10 +118,8 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let mut status = Vec::new();
     // a request for the status is never too long
     let _ = session.request(Command::Status, &mut status);
-    let scenario = args.scenario(truth);
-    let played = scenario::play_to(&scenario, args.finger, &args.firmware.elf, None, &status)?;
-    let mut board = played.board;
-    let times = milestones(&board, &played.seen);
+    let Holder { mut board, looks } = args.explore(number, &status)?;
+    let times = milestones(&board, &looks);
     let heard = Heard::of(&mut board, session)?;
     let seconds = board.now_ns() as f64 * 1e-9;
     // negative where the verdict was there before the hand stood
