@@ -48,7 +48,6 @@ enum Cli {
     Stack(stack_depth::Args),
 }
 
-/// Runs a sub-command.
 fn run(cli: &Cli) -> Result<ExitCode, RunError> {
     let met = |met| {
         if met {

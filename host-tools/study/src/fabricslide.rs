@@ -36,7 +36,6 @@ use tactus_lab::eval::experiment::{Experiment, ExperimentError};
 pub use features::BAND_EDGES;
 use features::{Meter, ROW_BYTES, TAXELS};
 
-/// Name of the manifest.
 const MANIFEST: &str = "manifest.json";
 /// Most bytes of samples of one fabric: it is read into memory as a whole, and all fabrics at once.
 const MAX_RAW: u64 = 1 << 28;
@@ -87,9 +86,6 @@ pub struct FabricSlide {
 
 impl FabricSet {
     /// An experiment that learns from all slides of one repetition and is tested on the other.
-    ///
-    /// # Errors
-    /// See [`ExperimentError`].
     pub fn experiment(&self, learned_from: u8, seed: u64) -> Result<Experiment, ExperimentError> {
         let observation = |s: &FabricSlide| Observation {
             properties: Properties::new(s.properties.map(Some)),
@@ -112,10 +108,8 @@ impl FabricSet {
         Experiment::collected(names, movements, train, of(false), Some(there), seed)
     }
 
-    /// Reads and measures all fabrics of a folder.
-    ///
-    /// # Errors
-    /// If the folder, its manifest or a file of samples cannot be read, makes no sense or was changed.
+    /// Reads and measures all fabrics of a folder. Errors: the folder, its manifest or a file of samples cannot be
+    /// read, makes no sense or was changed.
     pub fn open(folder: &Path) -> Result<Self, FabricError> {
         let path = folder.join(MANIFEST);
         let bytes = files::read_bounded(&path, files::MAX_MANIFEST)?;

@@ -74,9 +74,6 @@ pub enum ReportError {
 }
 
 /// Makes the folder of a report, or takes an empty one. Called before the work, which takes minutes.
-///
-/// # Errors
-/// See [`ReportError`].
 pub fn prepare(folder: &Path) -> Result<(), ReportError> {
     let error = |source| ReportError::Io {
         path: folder.to_owned(),
@@ -90,9 +87,6 @@ pub fn prepare(folder: &Path) -> Result<(), ReportError> {
 }
 
 /// Writes everything of a study into its folder, the page last.
-///
-/// # Errors
-/// See [`ReportError`].
 pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
     let put = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
@@ -107,9 +101,6 @@ pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
 }
 
 /// study.json.
-///
-/// # Errors
-/// [`ReportError::Json`].
 pub fn json(study: &Study) -> Result<String, ReportError> {
     Ok(serde_json::to_string(study)? + "\n")
 }
@@ -148,7 +139,6 @@ impl Contents {
     }
 }
 
-/// Tables, figures and numbers of the whole study.
 fn contents(study: &Study) -> Result<Contents, DrawError> {
     let mut all = Contents::default();
     let about = json!({

@@ -7,7 +7,6 @@ use anyhow::Result;
 pub(crate) use build::build;
 pub(crate) use check::{check, emulated};
 
-/// Builds the page.
 pub(crate) fn page() -> Result<()> {
     let built = build("release")?;
     println!(

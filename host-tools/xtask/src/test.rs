@@ -107,14 +107,12 @@ fn failures(lines: &[String]) -> String {
     all
 }
 
-/// Runs one step here.
 pub(crate) fn one(name: &str) -> Result<()> {
     let step = ROWS.concat().into_iter().find(|(step, _)| *step == name);
     let (_, check) = step.with_context(|| format!("there is no step {name:?}"))?;
     check()
 }
 
-/// Formatting, lints and unit tests.
 pub(crate) fn check() -> Result<()> {
     formatting()?;
     lints()?;
@@ -129,7 +127,6 @@ pub(crate) fn check() -> Result<()> {
 /// A step that is over: its name, the seconds that it took, and why it failed if it did.
 type Ended = (&'static str, u64, Option<String>);
 
-/// Runs every step.
 pub(crate) fn test() -> Result<()> {
     // cargo may put another program there meanwhile
     let program = &std::env::current_exe().context("cannot find this program")?;

@@ -133,7 +133,6 @@ impl Emulator {
         }
     }
 
-    /// The reason why the run is over.
     fn end(&mut self) -> Error {
         self.commands = None;
         match self.thread.take().map(JoinHandle::join) {
@@ -148,10 +147,8 @@ impl Emulator {
         self.now_ns
     }
 
-    /// Goes on to a virtual time, ns; one that is past is now.
-    ///
-    /// # Errors
-    /// [`Error::Ended`] if the firmware ended the run by semihosting, else the emulator's.
+    /// Goes on to a virtual time, ns; one that is past is now. Errors: [`Error::Ended`] if the firmware ended the run
+    /// by semihosting, else the emulator's.
     pub fn run_until(&mut self, until_ns: u64) -> Result<(), Error> {
         if until_ns <= self.now_ns {
             return Ok(());
@@ -340,10 +337,7 @@ impl Emulator {
     }
 
     /// Makes the flash's interrupt clear its flags without waking a task, by new code for its handler. Returns the
-    /// original code and its address.
-    ///
-    /// # Errors
-    /// [`Error::Symbol`] and [`Error::NoSpace`].
+    /// original code and its address. Errors: [`Error::Symbol`] and [`Error::NoSpace`].
     pub fn lose_flash_interrupts(&mut self) -> Result<(u64, Vec<u8>), Error> {
         const HANDLER: &str = "FLASH";
         let (address, size) = self.symbol(HANDLER)?;
@@ -459,9 +453,6 @@ impl Emulator {
     }
 
     /// The address and the size, in bytes, of the one symbol that has `name` as its path or in it.
-    ///
-    /// # Errors
-    /// [`Error::Symbol`].
     pub fn symbol(&self, name: &str) -> Result<(u64, u64), Error> {
         let exact: Vec<_> = self.symbols.iter().filter(|(n, ..)| n == name).collect();
         let found = if exact.is_empty() {
@@ -486,9 +477,6 @@ impl Emulator {
     }
 
     /// Reads memory.
-    ///
-    /// # Errors
-    /// [`Error::Memory`].
     pub fn read(&mut self, address: u64, length: u64) -> Result<Vec<u8>, Error> {
         self.with(move |standing| {
             let bytes = (address..address + length).map(|address| {
@@ -502,9 +490,6 @@ impl Emulator {
 
     /// Writes memory, flash too: to break code on purpose, put `[0xFE, 0xE7]`, a branch to itself, or `[0x00, 0xDE]`,
     /// an undefined instruction, at the address of a function.
-    ///
-    /// # Errors
-    /// [`Error::Memory`].
     pub fn write(&mut self, address: u64, bytes: &[u8]) -> Result<(), Error> {
         let bytes = bytes.to_vec();
         self.with(move |standing| {

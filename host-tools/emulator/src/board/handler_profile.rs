@@ -7,18 +7,14 @@ use super::registers::{register, word};
 /// Place of the return address in an exception frame (ARM DDI 0403, B1.5.6), bytes above the stack pointer.
 const RETURN: u32 = 24;
 
-/// A handler that runs.
 struct Running {
-    /// The stack pointer that it began with.
     sp: u32,
-    /// The instruction that it interrupted.
     returns_to: u64,
     /// Instructions until it began, and those of handlers that interrupted it.
     began_at: u64,
     nested: u64,
 }
 
-/// Watches handlers, under any nesting.
 pub(crate) struct HandlerProfiler {
     /// Of all runs that are over.
     pub(crate) instructions: u64,

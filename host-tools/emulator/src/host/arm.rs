@@ -26,10 +26,6 @@ pub(crate) struct ArmPort {
 const SAYS_MS: u64 = 10;
 
 impl ArmPort {
-    /// Listens.
-    ///
-    /// # Errors
-    /// The port cannot be had.
     pub(crate) fn bind(port: u16) -> std::io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", port))?;
         listener.set_nonblocking(true)?;
@@ -40,10 +36,6 @@ impl ArmPort {
         })
     }
 
-    /// Address on which it listens.
-    ///
-    /// # Errors
-    /// The system does not say.
     pub(crate) fn address(&self) -> std::io::Result<std::net::SocketAddr> {
         self.listener.local_addr()
     }

@@ -36,9 +36,7 @@ pub const LIFTED_S: f64 = 0.5;
 pub(crate) enum Seen {
     /// The display is on.
     Lit,
-    /// It waits for a touch.
     Press,
-    /// It wants a slide.
     Slide,
     /// It wants none any more.
     Over,

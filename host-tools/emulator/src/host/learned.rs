@@ -11,7 +11,6 @@ use super::args::World;
 use super::progress;
 use super::under_finger::{self, FirmwareData, TRIALS, UnderFingerError, Unknown};
 
-/// The source of the textures.
 enum Textures {
     Simulated(Collection),
     Recorded(RecordedTexture),

@@ -144,9 +144,6 @@ pub fn recorded(
 }
 
 /// Number of a material by its name, in any case, or by its number from 1.
-///
-/// # Errors
-/// [`UnderFingerError::NoMaterial`].
 pub fn material(recorded_texture: &RecordedTexture, name: &str) -> Result<usize, UnderFingerError> {
     let number = name.parse().ok().map(|n: usize| n.wrapping_sub(1));
     let mut names = recorded_texture.names.iter();

@@ -9,7 +9,6 @@ use crate::host::under_finger::UnderFingerError;
 
 use super::bench::error::BenchError;
 
-/// Why a run did not come to its end.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
     #[error(transparent)]

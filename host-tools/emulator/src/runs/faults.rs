@@ -41,7 +41,6 @@ pub(crate) struct Args {
     elf: Option<PathBuf>,
 }
 
-/// Runs all cases; true if they are as they must be.
 pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
     let bar = progress::bar("cases", args.faults, ", {eta} left");
     let bench = Bench::new(factory::RIG)?;

@@ -96,7 +96,6 @@ enum VerdictKind {
     Unknown,
 }
 
-/// Has a hand explore, and says what the display told it.
 pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let text = args.format == Format::Text;
     let sha256 = args.firmware.show(text)?;

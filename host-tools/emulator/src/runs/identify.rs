@@ -28,7 +28,6 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// Prints what the firmware logged.
 pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
     for (at_ns, line) in board.log()? {
         eprintln!("{:10.3} s  {line}", at_ns as f64 * 1e-9);
@@ -36,7 +35,6 @@ pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
     Ok(())
 }
 
-/// Has the firmware identify what lies under its finger, and shows it as it goes.
 pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let world = &args.world;
     let text = args.format == Format::Text;
@@ -125,7 +123,6 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     }
 }
 
-/// Prints times, errors and the PC's agreement.
 fn summary(explored: &Exploration, times: &Milestones, wall_s: f64, recorded: bool) {
     println!(
         "{}{:.1} s of the board's time in {wall_s:.1} s. Force {:.1} %, speed {:.2} % off at most; slots within \

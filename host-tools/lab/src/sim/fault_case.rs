@@ -205,7 +205,6 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// The probe's messages so far.
 #[derive(Default)]
 struct HostLog {
     named: Vec<Named>,

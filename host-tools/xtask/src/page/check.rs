@@ -81,7 +81,6 @@ fn starts(program: &&str) -> bool {
     ask.status().is_ok_and(|status| status.success())
 }
 
-/// A Chromium of this machine.
 fn browser() -> Result<&'static str> {
     let browser = BROWSERS.into_iter().find(starts);
     browser.context("no Chromium (apt-get install chromium)")

@@ -10,7 +10,6 @@ use super::error::BenchError;
 use super::workload::{self, Counter, Workload};
 use crate::board::{Emulator, Options};
 
-/// What the chip found.
 pub(super) struct Counted {
     pub(super) instructions: u64,
     pub(super) equal: bool,
@@ -54,7 +53,6 @@ fn unsuitable(workload: Workload, what: &'static str) -> BenchError {
 }
 
 impl Bench {
-    /// Boots the silicon image as bench.
     pub(super) fn start(elf: &Path) -> Result<Self, BenchError> {
         let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
         let (wanted, _) = emulator.symbol("BENCH_WANTED")?;
@@ -77,7 +75,6 @@ impl Bench {
         Ok(u32::from_le_bytes(bytes.try_into().unwrap_or_default()))
     }
 
-    /// Lets the chip begin with a workload.
     fn begin(&mut self, workload: Workload, table: &[u8], words: &[i16]) -> Result<(), BenchError> {
         if 2 * words.len() as u64 > INPUT_BYTES {
             return Err(unsuitable(

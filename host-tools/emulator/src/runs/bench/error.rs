@@ -6,7 +6,6 @@ use tactus_lab::eval::learn::TableError as LearnError;
 use crate::board;
 use crate::host::talk::TalkError;
 
-/// Why nothing is counted.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BenchError {
     #[error(transparent)]

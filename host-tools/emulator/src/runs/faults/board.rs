@@ -286,10 +286,7 @@ impl<'e> BoardBench<'e> {
         Ok(Talk::new(emulator).look_every(LOOK_MS))
     }
 
-    /// Has a case happen.
-    ///
-    /// # Errors
-    /// The emulator, or a board that does not start before anything broke.
+    /// Has a case happen. Errors: The emulator, or a board that does not start before anything broke.
     pub fn run(&self, drawn: &BoardCase) -> Result<Outcome, TalkError> {
         let case = &drawn.case;
         let mut wrong = Vec::new();
@@ -407,7 +404,6 @@ impl<'e> BoardBench<'e> {
     }
 }
 
-/// Runs the board to a time.
 fn listen_until(talk: &mut Talk, ear: &mut Ear, until_ns: u64) -> Result<(), TalkError> {
     while talk.now_ns() < until_ns {
         for report in talk.step()? {
