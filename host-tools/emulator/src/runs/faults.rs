@@ -118,7 +118,6 @@ mod tests {
             named: Vec::new(),
             naming: Naming::Right,
             wrong: wrong.iter().map(|what| (*what).to_owned()).collect(),
-            took: Default::default(),
         };
         let (text, met) = summary(&[Ok(outcome(&[]))]);
         assert!(
