@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
 use crate::shell::{hear, root, run};
-use crate::{emulate, firmware, page};
+use crate::{emulate, firmware};
 pub(crate) use factory::{FOLDER, TABLES};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -54,8 +54,6 @@ enum Part {
     All,
     /// The factory tables, made again from the simulated world and compared
     Factory,
-    /// The page in a browser, with the firmware on the emulated board
-    Page,
     /// Tests that `cargo xtask test` leaves out, and all seeds of the others, in the workspace and on emulated boards
     Tests,
     /// Explorations on the emulated board
@@ -170,7 +168,6 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     );
     match (part, seeds) {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
-        (Part::Page, _) => page::emulated().map(|()| "passed".into()),
         (Part::Tests, _) => left_out(),
         (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),

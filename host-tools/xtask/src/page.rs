@@ -5,7 +5,7 @@ mod check;
 use anyhow::Result;
 
 pub(crate) use build::build;
-pub(crate) use check::{check, emulated};
+pub(crate) use check::check;
 
 pub(crate) fn page() -> Result<()> {
     let built = build("release")?;
