@@ -22,6 +22,8 @@ use super::workload::{ObservedSlide, Workload};
 pub(super) const SLIDE: usize = 6600;
 /// Textures of the tables that the gates are of: as many as the paper has.
 const OF_GATES: usize = 117;
+/// Textures that are still likely before a decision.
+const LIVE: usize = 50;
 /// Less probable textures are left out of a choice: the core's own limit.
 const NEGLIGIBLE: f32 = 1e-6;
 
@@ -60,10 +62,12 @@ const MOVEMENTS: [Movement; 3] = [
     Movement::FOR_ROUGHNESS,
 ];
 
-/// A table of so many textures, neighbours hard to tell apart, each learned from 5 slides of 3 movements.
-fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
+/// The table that decisions are counted with, its neighbours hard to tell apart, each learned from 5 slides of 3
+/// movements: of made-up numbers, and not of the simulated world as the factory table is, so that a figure tells of the
+/// code.
+pub(super) fn of_gates(method: Method) -> Result<Vec<u8>, BenchError> {
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    let names: Vec<String> = (1..=textures).map(|t| format!("texture {t}")).collect();
+    let names: Vec<String> = (1..=OF_GATES).map(|t| format!("texture {t}")).collect();
     let slides: Vec<Vec<Vec<Observation>>> = names
         .iter()
         .map(|_| {
@@ -90,12 +94,6 @@ fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
     Ok(learn::learn(method, None, &names, &MOVEMENTS, &slides)?)
 }
 
-/// The table that decisions are counted with: of made-up numbers, and not of the simulated world as the factory table
-/// is, so that a figure tells of the code.
-pub(super) fn of_gates(method: Method) -> Result<Vec<u8>, BenchError> {
-    synthetic(method, OF_GATES)
-}
-
 /// Compares signals that the figures below do not go through: any number of samples, beyond what 12 bits can differ by.
 pub(super) fn extremes(bench: &mut Bench) -> Result<(), BenchError> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
@@ -112,16 +110,10 @@ pub(super) fn extremes(bench: &mut Bench) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// An observed slide, as words, and how many textures it leaves.
-pub(super) struct Wanted {
-    pub(super) words: Vec<i16>,
-    pub(super) live: usize,
-}
-
-/// A slide after which so many textures are still likely, or as nearly as can be found.
-pub(super) fn observed(table: &[u8], method: Method, live: usize) -> Result<Wanted, BenchError> {
+/// A slide, as words, after which [`LIVE`] textures are still likely, or as nearly as can be found.
+pub(super) fn observed(table: &[u8], method: Method) -> Result<Vec<i16>, BenchError> {
     let table = Table::read(table).map_err(|_| unsuitable("a decision", "the table is broken"))?;
-    let mut random = ChaCha8Rng::seed_from_u64(live as u64);
+    let mut random = ChaCha8Rng::seed_from_u64(LIVE as u64);
     let config = Config {
         method,
         ..Config::default()
@@ -143,18 +135,18 @@ pub(super) fn observed(table: &[u8], method: Method, live: usize) -> Result<Want
         let left = left.count();
         if best
             .as_ref()
-            .is_none_or(|(best, _)| left.abs_diff(live) < best.abs_diff(live))
+            .is_none_or(|(best, _)| left.abs_diff(LIVE) < best.abs_diff(LIVE))
         {
             best = Some((left, observed));
         }
-        if left == live {
+        if left == LIVE {
             break;
         }
     }
-    let (live, observed) = best.ok_or_else(|| unsuitable("a decision", "no slide suits"))?;
+    let (_, observed) = best.ok_or_else(|| unsuitable("a decision", "no slide suits"))?;
     let mut words = Vec::new();
     observed.write(|word| words.push(word));
-    Ok(Wanted { words, live })
+    Ok(words)
 }
 
 /// A slide of one of the textures, looked at by one property.
