@@ -1,7 +1,6 @@
 //! What the program does: a sub-command each.
 
 pub mod bench;
-mod error;
 pub mod faults;
 mod handheld;
 mod identify;
@@ -10,9 +9,8 @@ mod stack_depth;
 
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::Parser;
-
-use error::RunError;
 
 /// Runs the firmware's ELF, unmodified, on a NUCLEO-F429ZI in software with the simulated rig on its pins.
 #[derive(Parser)]
@@ -48,7 +46,7 @@ enum Cli {
     Stack(stack_depth::Args),
 }
 
-fn run(cli: &Cli) -> Result<ExitCode, RunError> {
+fn run(cli: &Cli) -> Result<ExitCode> {
     let met = |met| {
         if met {
             ExitCode::SUCCESS

@@ -2,7 +2,6 @@
 //! instructions that it counted are read, and the plain kernels do the same on this PC.
 
 mod counter;
-pub(crate) mod error;
 mod gates;
 mod inputs;
 mod on_the_rig;
@@ -14,6 +13,7 @@ pub mod workload;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::bail;
 use clap::Args as Arguments;
 use serde_json::Value;
 use tactus_core::explorer::Method;
@@ -21,13 +21,11 @@ use tactus_core::sensor::FingerName;
 use tactus_core::wire::Identify;
 
 use self::counter::Bench;
-use self::error::BenchError;
 use self::gates::{GATES, gate};
 use self::inputs::{SLIDE, extremes, observed, of_gates, slide};
 use self::on_the_rig::on_the_rig;
 use self::row::{Row, print};
 use self::workload::Workload;
-use super::error::RunError;
 use crate::host::args::{Firmware, Format};
 
 /// What is counted.
@@ -60,9 +58,10 @@ fn one_slide() -> Identify {
 
 /// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
 const MISSED: u8 = 2;
+const DIFFERENT: &str = "not what the plain kernels give: ";
 
 /// Counts, and says by its exit code whether every gate is met.
-pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let met = count(args)?;
     Ok(if met {
         ExitCode::SUCCESS
@@ -71,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
     })
 }
 
-fn count(args: &Args) -> Result<bool, BenchError> {
+fn count(args: &Args) -> anyhow::Result<bool> {
     let text = args.format == Format::Text;
     if let Some(rig) = args
         .rig
@@ -96,8 +95,7 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         slow = Some(slowed::slowed(rig, slowed::WORST_RATIO * slowed::RESERVE));
         let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
         if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
-            let (kernel, what) = ((*name).to_owned(), "it has a gate and was not counted");
-            return Err(BenchError::Unsuitable { kernel, what });
+            bail!("{name}: it has a gate and was not counted");
         }
     }
     if text {
@@ -109,9 +107,9 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         println!("{}", Value::from_iter(rows.iter().map(Row::json)));
     }
     let different = rows.iter().filter(|row| !row.equal);
-    let different: Vec<String> = different.map(|row| row.kernel.clone()).collect();
+    let different: Vec<&str> = different.map(|row| row.kernel.as_str()).collect();
     if !different.is_empty() {
-        return Err(BenchError::Different(different));
+        bail!(DIFFERENT.to_owned() + &different.join("; "));
     }
     let in_time = slow.is_none_or(|slowed| slowed::missed(&slowed).is_empty());
     Ok(in_time && rows.iter().all(Row::ok))
@@ -158,7 +156,7 @@ impl<'a> Kernel<'a> {
         }
     }
 
-    fn count(self, bench: &mut Bench) -> Result<Row, BenchError> {
+    fn count(self, bench: &mut Bench) -> anyhow::Result<Row> {
         let counted = bench.count(self.workload, self.table, self.words)?;
         let units = self.units as f64;
         Ok(Row {
@@ -174,7 +172,7 @@ impl<'a> Kernel<'a> {
 }
 
 /// The core's kernels as a rig with 117 textures uses them, on a slide.
-fn kernels(bench: &mut Bench, samples: &[i16]) -> Result<Vec<Row>, BenchError> {
+fn kernels(bench: &mut Bench, samples: &[i16]) -> anyhow::Result<Vec<Row>> {
     let name = "band-pass FIR with mean power";
     let band_power = Kernel {
         units: SLIDE,

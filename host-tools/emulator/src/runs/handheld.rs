@@ -1,5 +1,6 @@
 //! An exploration by the handheld's firmware: a hand presses and slides, and the display says what it is.
 
+use anyhow::{Context as _, anyhow};
 use clap::Args as Arguments;
 use serde_json::json;
 use tactus_core::sensor::FingerName;
@@ -9,7 +10,6 @@ use tactus_link::Session;
 use tactus_world::person::Manner;
 use tactus_world::textures::TEXTURES;
 
-use super::error::RunError;
 use crate::board::{Display, Emulator, Error};
 use crate::host::args::{Firmware, Format};
 use crate::host::hand::{Holder, SLIDE_S, Seen};
@@ -18,6 +18,7 @@ use crate::host::under_finger::UnderFingerError;
 
 /// The firmware's table is of this world.
 const WORLD: u64 = 1;
+const NO_VERDICT: &str = "the display shows no verdict";
 /// How the slides are meant: as the display asks for them.
 const FORCE_N: f64 = 0.5;
 const PACE_MM_S: f64 = 25.0;
@@ -63,7 +64,7 @@ pub(crate) struct Args {
 
 impl Args {
     /// Has a hand explore this texture, whose host sends these bytes once it is heard.
-    fn explore(&self, texture: u8, host: &[u8]) -> Result<Holder, RunError> {
+    fn explore(&self, texture: u8, host: &[u8]) -> anyhow::Result<Holder> {
         let collection = Collection::new(WORLD, Vec::new(), 1).touched_by(self.finger);
         let setup = collection.setup(texture, 100 * self.seed);
         let hand = Manner {
@@ -76,7 +77,7 @@ impl Args {
         holder.board.send(host);
         match holder.explore(FORCE_N, PACE_MM_S, SLIDES, self.slide_s)? {
             true => Ok(holder),
-            false => Err(RunError::NoVerdict),
+            false => Err(anyhow!(NO_VERDICT)),
         }
     }
 }
@@ -96,7 +97,7 @@ enum VerdictKind {
     Unknown,
 }
 
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let text = args.format == Format::Text;
     let sha256 = args.firmware.show(text)?;
     let number = match &args.texture {
@@ -127,7 +128,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let end_to_screen_s = stood_ns
         .zip(written_ns)
         .map(|(from, to)| (to as f64 - from as f64) * 1e-9);
-    let told = told(board.rig().display()).ok_or(RunError::NoVerdict)?;
+    let told = told(board.rig().display()).context(NO_VERDICT)?;
     let (says, verdict) = match told {
         VerdictKind::Sure(name) if name == truth => (format!("It is {name}."), "Right"),
         VerdictKind::Sure(name) => (format!("It is {name}."), "Wrong"),

@@ -3,12 +3,12 @@
 use std::io::Write as _;
 use std::time::Instant;
 
+use anyhow::bail;
 use clap::Args as Arguments;
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Report};
 use tactus_lab::eval::show::{Show, count, is_right};
 
-use super::error::RunError;
 use crate::board::{self, Emulator, Options};
 use crate::host::args::{Format, World};
 use crate::host::exploration::{self, Exploration, ExploreError};
@@ -35,7 +35,7 @@ pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
     Ok(())
 }
 
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let world = &args.world;
     let text = args.format == Format::Text;
     let sha256 = world.firmware.show(text)?;
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     std::io::stdout().flush()?;
     match explored.missed() {
         missed if missed.is_empty() => Ok(()),
-        missed => Err(RunError::Missed(missed)),
+        missed => bail!("not as it must be: {}", missed.join("; ")),
     }
 }
 

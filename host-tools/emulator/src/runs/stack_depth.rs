@@ -4,13 +4,13 @@
 use std::ops::Range;
 use std::path::Path;
 
+use anyhow::ensure;
 use clap::Args as Arguments;
 use object::{Object as _, ObjectSymbol as _};
 use serde_json::json;
 use tactus_core::wire::{Command, Event, Identify};
 use tactus_world::world::Setup;
 
-use super::error::RunError;
 use crate::board::{Emulator, Error, Options};
 use crate::host::args::Firmware;
 use crate::host::talk::Talk;
@@ -52,7 +52,7 @@ fn stack(path: &Path) -> Result<Range<u64>, Error> {
 }
 
 /// Measures the stack of the rig's firmware while it identifies a texture among those of its factory table.
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (elf, slides) = (&args.firmware.elf, args.slides);
     let stack = stack(elf)?;
     let length = stack.end - stack.start;
@@ -79,9 +79,10 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
             );
         }
     })?;
-    if observed == 0 {
-        return Err(RunError::NoSlide);
-    }
+    ensure!(
+        observed > 0,
+        "the exploration had no slide: the stack that was measured says nothing"
+    );
     let left = talk.board().read(stack.start, length)?;
     let used = left.iter().skip_while(|byte| **byte == PAINT).count();
     println!("{}", json!({ "used": used }));
