@@ -11,7 +11,6 @@ use tactus_core::explorer::Method;
 use tactus_core::features::FeatureSet;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault, RigError};
-use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Failure, Identify, Rejection, Verdict};
 use tactus_lab::sim::collection::{Collection, texture_name, texture_number};
 use tactus_lab::sim::flash::{RamFlash, TABLE};
@@ -102,19 +101,15 @@ fn explore(
 fn table(world: &Collection) -> Vec<u8> {
     let setup = world.setup(world.textures[0], 0);
     let calibration = tactus_lab::sim::collection::calibrated(setup).unwrap();
-    let (finger, movements) = (FingerName::Biotac, &Collection::MOVEMENTS);
+    let movements = &Collection::MOVEMENTS;
     let bands = (Method::Fused, Some(FeatureSet::Bands));
     world
-        .learn_with(finger, movements, bands, calibration, || ())
+        .learn_at(movements, bands, &[], calibration, || ())
         .unwrap()
 }
 
 fn world(seed: u64, unknown: u8, among: u8) -> Collection {
-    Collection {
-        seed,
-        textures: Collection::spread(unknown, among),
-        trials: 5,
-    }
+    Collection::new(seed, Collection::spread(unknown, among), 5)
 }
 
 #[test]

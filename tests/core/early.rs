@@ -96,13 +96,15 @@ fn explored(
 
 /// Four explorations in a world, by slides to their end and by slides that may end early.
 fn in_a_world(seed: u64) -> [Sums; 2] {
-    let world = Collection {
-        seed,
-        textures: Collection::spread(texture(seed), 8),
-        trials: 4,
-    };
+    let world = Collection::new(seed, Collection::spread(texture(seed), 8), 4);
     let calibration = calibrated(world.setup(world.textures[0], 0)).unwrap();
-    let early = world.learn_lengths(Method::Fused, calibration, &[500, 1000, 2000], || ());
+    let early = world.learn_at(
+        &Collection::MOVEMENTS,
+        (Method::Fused, None),
+        &[500, 1000, 2000],
+        calibration,
+        || (),
+    );
     let early = early.unwrap();
     let early = Table::read(&early).unwrap();
     // the same without lengths
@@ -161,14 +163,16 @@ impl Host for Heard {
 
 #[test]
 fn a_probe_says_when_a_slide_ended_and_learns_nothing_from_it() {
-    let world = Collection {
-        seed: 5,
-        textures: Collection::spread(47, 8),
-        trials: 5,
-    };
+    let world = Collection::new(5, Collection::spread(47, 8), 5);
     let calibration = calibrated(world.setup(47, 0)).unwrap();
     let bytes = world
-        .learn_lengths(Method::Fused, calibration, &[500, 1000], || ())
+        .learn_at(
+            &Collection::MOVEMENTS,
+            (Method::Fused, None),
+            &[500, 1000],
+            calibration,
+            || (),
+        )
         .unwrap();
     let table = Table::read(&bytes).unwrap();
     let lengths: Vec<u16> = table.lengths_ms().collect();

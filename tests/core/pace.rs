@@ -67,11 +67,7 @@ fn explore(table: Table<'_>, is: u16, slides: &[Observation]) -> Counts {
 /// Explorations of these textures in a world: without a sensor of speed, with it, and without it by the table that was
 /// learned with it.
 fn world(seed: u64, textures: &[u8], manner: Manner) -> [Counts; 3] {
-    let collection = Collection {
-        seed,
-        textures: textures.to_vec(),
-        trials: TRIALS as u32,
-    };
+    let collection = Collection::new(seed, textures.to_vec(), TRIALS as u32);
     let wanted = (TRIALS + EXPLORED * ASK_AFTER) as u32;
     let felt = collection.textures.par_iter().zip(collection.names());
     // a texture that is too smooth to be noticed is left out

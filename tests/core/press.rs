@@ -182,11 +182,7 @@ impl Bench {
     /// Makes these movements; high forces are allowed.
     pub(crate) fn make(&self, movements: impl IntoIterator<Item = Movement>) -> Vec<Press> {
         let number = Trouble::ALL.iter().position(|t| *t == self.trouble);
-        let collection = Collection {
-            seed: self.world,
-            textures: Vec::new(),
-            trials: 1,
-        };
+        let collection = Collection::new(self.world, Vec::new(), 1);
         let setup = Setup {
             shimmed: true,
             ..collection.setup(self.texture, 900 + number.unwrap_or(0) as u64)

@@ -102,11 +102,7 @@ fn rigs() -> Vec<(String, SimRig)> {
     let samples =
         (1..=count(2, 1)).flat_map(|world| [45, 30, 100, 117].map(|texture| (world, texture)));
     let rig = |(seed, texture)| {
-        let world = Collection {
-            seed,
-            textures: Vec::new(),
-            trials: 1,
-        };
+        let world = Collection::new(seed, Vec::new(), 1);
         let setup = Setup {
             shimmed: true,
             ..world.setup(texture, 950)
@@ -245,15 +241,11 @@ struct Pressed {
 }
 
 fn two_presses(finger: FingerName, seed: u64) -> Pressed {
-    let collection = Collection {
-        seed,
-        textures: Vec::new(),
-        trials: 1,
-    };
+    let collection = Collection::new(seed, Vec::new(), 1).touched_by(finger);
     let texture = texture(seed);
     let setup = Setup {
         shimmed: true,
-        ..collection.setup_with(finger, texture, 1)
+        ..collection.setup(texture, 1)
     };
     let name = format!("{finger}, seed {seed}, texture {texture}");
     let mut rig = SimRig::new(setup);

@@ -19,11 +19,7 @@ use tactus_world::Conditions;
 use tactus_world::world::Setup;
 
 fn world(seed: u64) -> Collection {
-    Collection {
-        seed,
-        textures: Collection::spread(47, 12),
-        trials: 5,
-    }
+    Collection::new(seed, Collection::spread(47, 12), 5)
 }
 
 /// Which fingertip, how worn its skin is, and what was measured of it.

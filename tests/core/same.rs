@@ -16,11 +16,7 @@ use tactus_lab::sim::rig::SimRig;
 use tactus_tests::count;
 
 fn world() -> Collection {
-    Collection {
-        seed: 5,
-        textures: Collection::spread(47, 8),
-        trials: 5,
-    }
+    Collection::new(5, Collection::spread(47, 8), 5)
 }
 
 /// What a host hears, how the output was set, and for which false alarms the table in force is.

@@ -31,11 +31,7 @@ const COUNT_N: f64 = 0.0115;
 
 #[test]
 fn explorations_are_right_and_made_as_asked() {
-    let world = Collection {
-        seed: 11,
-        textures: (0..count(117, 40)).map(texture).collect(),
-        trials: 5,
-    };
+    let world = Collection::new(11, (0..count(117, 40)).map(texture).collect(), 5);
     let calibration = calibrated(world.setup(1, 0)).unwrap();
     let bytes = world.learn(Method::Fused, calibration, || ()).unwrap();
     let table = Table::read(&bytes).unwrap();
@@ -91,11 +87,7 @@ fn explorations_are_right_and_made_as_asked() {
 
 #[test]
 fn the_same_seed_gives_the_same_slides_on_any_number_of_threads() {
-    let world = Collection {
-        seed: 3,
-        textures: vec![10, 47, 100],
-        trials: 1,
-    };
+    let world = Collection::new(3, vec![10, 47, 100], 1);
     let calibration = calibrated(world.setup(10, 0)).unwrap();
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()

@@ -7,7 +7,7 @@ const ROOMS: &str = "
 shared/src/ sensor < dsp < features < table < explorer rig < store < wire < probe < handheld
 firmware/src/ board < chip < tasks < boot < bench selftest handheld rig arm
 host-tools/lab/src/ data < eval < sim < live < remote
-host-tools/emulator/src/ board < host < scenario < runs";
+host-tools/emulator/src/ board < host < runs";
 /// Crates of the project that a crate may depend on.
 const CRATES: &str = "
 shared -

@@ -27,33 +27,18 @@ pub enum Workload {
     Frame,
     /// All features of a slide, in blocks.
     Slide,
-    /// An explorer for a table, with all that is a constant of the table.
-    Begin,
-    /// The first choice.
-    FirstChoice,
-    /// The posterior of a slide.
-    Observe,
-    /// The choice after it.
-    Choice,
     /// From the last sample of a slide to the next choice.
     Decision,
-    /// A look at the first part of a slide, by the shortest length that the table knows.
-    Look,
 }
 
 impl Workload {
     /// All, by their codes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 5] = [
         Self::Nothing,
         Self::BandPower,
         Self::Frame,
         Self::Slide,
-        Self::Begin,
-        Self::FirstChoice,
-        Self::Observe,
-        Self::Choice,
         Self::Decision,
-        Self::Look,
     ];
 }
 
@@ -172,21 +157,13 @@ pub fn run(
             });
             put_observation(&observed.ok()?, put);
         }
-        _ => explore(
-            workload,
-            plan,
-            Table::read(table).ok()?,
-            words,
-            counter,
-            put,
-        )?,
+        Workload::Decision => decide(plan, Table::read(table).ok()?, words, counter, put)?,
     }
     Some(())
 }
 
 #[inline(never)]
-fn explore(
-    workload: Workload,
+fn decide(
     plan: &Plan,
     table: Table<'_>,
     words: &[i16],
@@ -198,66 +175,32 @@ fn explore(
         method: observed.method,
         ..Config::default()
     };
-    let begin = || Explorer::<CAPACITY>::new(table, PropertySet::ALL, config);
-    let mut explorer = if workload == Workload::Begin {
-        counter.count(begin).ok()?
-    } else {
-        begin().ok()?
-    };
-    let choose = |explorer: &Explorer<'_, CAPACITY>| {
+    let mut explorer = Explorer::<CAPACITY>::new(table, PropertySet::ALL, config).ok()?;
+    let (mut slide, mut block) = slide_of(plan, samples);
+    let mut rest = samples.chunks(BLOCK);
+    let last = rest.next_back()?;
+    for samples in rest {
+        fill(&mut block, samples);
+        slide.take(&block);
+    }
+    fill(&mut block, last);
+    let decided = counter.count(|| {
+        slide.take(&block);
+        let measured = slide.finish().map(|slide| Observation::from(&slide));
+        // the posterior is of the other slide, which leaves as many textures as are wanted
+        let seen = explorer.observe(observed.action, black_box(&observed.slide));
         let mut outcomes = Vec::new();
         explorer.evaluate_actions(&mut outcomes);
-        black_box(explorer.choose(black_box(&outcomes), 0))
-    };
-    let chosen = match workload {
-        Workload::FirstChoice => Some(counter.count(|| choose(black_box(&explorer)))),
-        Workload::Observe => {
-            let slide = black_box(&observed.slide);
-            let done = counter.count(|| explorer.observe(observed.action, slide));
-            done.ok()?;
-            None
-        }
-        Workload::Look => {
-            let slide = black_box(&observed.slide);
-            let look = counter.count(|| explorer.look(observed.action, 1, slide));
-            let look = look.ok()??;
-            put(&look.texture.to_le_bytes());
-            put(&look.doubt.to_le_bytes());
-            put(&[look.known.into()]);
-            None
-        }
-        Workload::Choice => {
-            explorer.observe(observed.action, &observed.slide).ok()?;
-            Some(counter.count(|| choose(black_box(&explorer))))
-        }
-        Workload::Decision => {
-            let (mut slide, mut block) = slide_of(plan, samples);
-            let mut rest = samples.chunks(BLOCK);
-            let last = rest.next_back()?;
-            for samples in rest {
-                fill(&mut block, samples);
-                slide.take(&block);
-            }
-            fill(&mut block, last);
-            let decided = counter.count(|| {
-                slide.take(&block);
-                let measured = slide.finish().map(|slide| Observation::from(&slide));
-                // the posterior is of the other slide, which leaves as many textures as are wanted
-                let seen = explorer.observe(observed.action, black_box(&observed.slide));
-                (measured, seen, explorer.verdict(), choose(&explorer))
-            });
-            let (measured, seen, _, chosen) = decided;
-            seen.ok()?;
-            put_observation(&measured.ok()?, put);
-            Some(chosen)
-        }
-        _ => None,
-    };
+        let chosen = black_box(explorer.choose(black_box(&outcomes), 0));
+        (measured, seen, explorer.verdict(), chosen)
+    });
+    let (measured, seen, _, action) = decided;
+    seen.ok()?;
+    put_observation(&measured.ok()?, put);
     for p in explorer.posterior() {
         put(&p.to_le_bytes());
     }
     put(&explorer.log_odds().unwrap_or(f32::NAN).to_le_bytes());
-    let action = chosen.unwrap_or_else(|| choose(&explorer));
     put(&[action.movement]);
     for outcome in &explorer.expected_outcomes() {
         put(&outcome.uncertainty.to_le_bytes());

@@ -3,10 +3,9 @@
 pub mod args;
 pub mod arm;
 pub mod exploration;
+pub mod hand;
 pub mod learned;
 pub mod milestones;
-pub mod person;
-pub mod power_cut;
 pub mod progress;
 pub mod talk;
 pub mod under_finger;

@@ -6,9 +6,8 @@
 //! What passes here says much for logic and use of the drivers and nothing for silicon: instructions take 1/168 us
 //! each, whatever they are, and no wire has a length.
 //!
-//! The rooms, each of which knows those before it: [`board`], [`host`], then [`scenario`] and [`runs`].
+//! The rooms, each of which knows those before it: [`board`], [`host`], then [`runs`].
 
 pub mod board;
 pub mod host;
 pub mod runs;
-pub mod scenario;

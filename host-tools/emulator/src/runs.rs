@@ -1,8 +1,6 @@
 //! What the program does: a sub-command each.
 
 pub mod bench;
-mod cuts;
-mod error;
 pub mod faults;
 mod handheld;
 mod identify;
@@ -11,9 +9,8 @@ mod stack_depth;
 
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::Parser;
-
-use error::RunError;
 
 /// Runs the firmware's ELF, unmodified, on a NUCLEO-F429ZI in software with the simulated rig on its pins.
 #[derive(Parser)]
@@ -41,8 +38,6 @@ enum Cli {
     #[command(after_help = "Example:
   tactus-emulator serve --elf tactus-rig --port 7429              talk to it yourself")]
     Serve(serve::Args),
-    /// Cut its power at every word that it stores
-    Cuts(cuts::Args),
     /// Break the rig in many ways, at any moment of whatever its probe does
     Faults(faults::Args),
     /// Count the instructions of the core's kernels
@@ -51,8 +46,7 @@ enum Cli {
     Stack(stack_depth::Args),
 }
 
-/// Runs a sub-command.
-fn run(cli: &Cli) -> Result<ExitCode, RunError> {
+fn run(cli: &Cli) -> Result<ExitCode> {
     let met = |met| {
         if met {
             ExitCode::SUCCESS
@@ -64,7 +58,6 @@ fn run(cli: &Cli) -> Result<ExitCode, RunError> {
         Cli::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Handheld(args) => handheld::run(args).map(|()| ExitCode::SUCCESS),
         Cli::Serve(args) => serve::run(args).map(|()| ExitCode::SUCCESS),
-        Cli::Cuts(args) => cuts::run(args).map(met),
         Cli::Faults(args) => faults::run(args).map(met),
         Cli::Bench(args) => bench::run(args),
         Cli::Stack(args) => stack_depth::run(args).map(|()| ExitCode::SUCCESS),

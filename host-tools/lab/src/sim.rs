@@ -11,4 +11,3 @@ pub mod over_link;
 pub mod probe;
 pub mod recorded;
 pub mod rig;
-pub mod scenario;

@@ -16,9 +16,7 @@ const test = (name, run) => tests.push({ name, run });
 const WIDTHS = [360, 390, 768, 1280, 2560];
 const NOW = "tactus.now()";
 // all of it, and one test: what takes longer hangs
-// An emulated board is slower than a probe in software by TACTUS_PAGE_SLOW.
-const SLOW = Number(process.env.TACTUS_PAGE_SLOW ?? 1);
-const ALL_S = Number(process.env.TACTUS_PAGE_LIMIT_S ?? 360 * SLOW), TEST_S = 150 * SLOW;
+const ALL_S = Number(process.env.TACTUS_PAGE_LIMIT_S ?? 360), TEST_S = 150;
 
 function module() {
   const instance = new WebAssembly.Instance(new WebAssembly.Module(readFileSync(wasm)), {});
@@ -209,14 +207,14 @@ const usb = async run => {
     return await opened("#speed=max&t=0.99", { motion: "reduce", before }, async it => {
       await press(it, "from-usb");
       await press(it, "u-connect");
-      await it.until("the probe has said how it is", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
+      await it.until("the probe has said how it is", "tactus.usb()?.connected && !tactus.usb().busy", 30);
       return run(it, line.unplug);
     });
   } finally {
     line?.end();
   }
 };
-const idle = (it, what, seconds = 60) => it.until(what, "!tactus.usb()?.busy", seconds * SLOW);
+const idle = (it, what, seconds = 60) => it.until(what, "!tactus.usb()?.busy", seconds);
 const said = it => text(it, "u-said");
 const kept = async it => new Map((await it.evaluate("tactus.files()")).map(({ name, bytes }) => [name, Buffer.from(bytes)]));
 
@@ -224,7 +222,7 @@ test("a probe at a serial port: status, identify, teach, verify, log", () => usb
   assert.match(await said(it), /^probe +at USB 0483:374b$/m);
   assert.match(await said(it), /^finger +biotac/m);
   await press(it, "u-identify");
-  await it.until("it slides", "tactus.usb().phase === 'Sliding'", 60 * SLOW);
+  await it.until("it slides", "tactus.usb().phase === 'Sliding'", 60);
   assert.equal(await it.evaluate("document.getElementById('u-identify').disabled"), true);
   await idle(it, "an answer", 150);
   assert.match(await said(it), /An unknown texture, one of \d+ [^]*Slide 1: [^]*because it should leave/);
@@ -289,7 +287,7 @@ test("the lens's caption lies on nothing, wherever the stage is", () => opened("
 
 test("a probe at a serial port: names, settings, and the sample is moved between trials", () => usb(async it => {
   const asks = async (what, words) => {
-    await it.until(what, "!document.getElementById('u-question').hidden", 150 * SLOW);
+    await it.until(what, "!document.getElementById('u-question').hidden", 150);
     assert.match(await text(it, "u-asked"), words);
   };
   await set(it, "u-name", "Loden");
@@ -344,7 +342,7 @@ test("a probe at a serial port: names, settings, and the sample is moved between
 
 test("a probe at a serial port: stop, record, tables, and a plug that is pulled", () => usb(async (it, unplug) => {
   await press(it, "u-identify");
-  await it.until("it slides", "tactus.usb().phase === 'Sliding'", 60 * SLOW);
+  await it.until("it slides", "tactus.usb().phase === 'Sliding'", 60);
   await press(it, "u-stop");
   await idle(it, "it stands", 60);
   assert.equal(await text(it, "u-problem"), "Stopped: the finger is lifted and the stage stands.");

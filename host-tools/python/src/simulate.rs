@@ -76,11 +76,7 @@ fn collection(textures: Option<Vec<String>>, trials: u32, seed: u64) -> PyResult
             "textures: one at least; trials: 1 to 1000",
         ));
     }
-    Ok(Collection {
-        seed,
-        textures: numbers,
-        trials,
-    })
+    Ok(Collection::new(seed, numbers, trials))
 }
 
 #[pymethods]
@@ -89,14 +85,10 @@ impl SimulatedRig {
     #[pyo3(signature = (texture, *, seed=1, trial=1, finger="biotac"))]
     fn new(py: Python<'_>, texture: &str, seed: u64, trial: u64, finger: &str) -> PyResult<Self> {
         let (number, finger) = (number(texture)?, finger_named(finger)?);
-        let world = Collection {
-            seed,
-            textures: vec![number],
-            trials: 1,
-        };
+        let world = Collection::new(seed, vec![number], 1).touched_by(finger);
         let rig = work(py, move |_| {
-            let calibration = calibrated(world.setup_with(finger, number, 0))?;
-            let mut rig = SimRig::new(world.setup_with(finger, number, trial));
+            let calibration = calibrated(world.setup(number, 0))?;
+            let mut rig = SimRig::new(world.setup(number, trial));
             // these constants are the ones it measured
             rig.control().calibrate(calibration)?;
             rig.home().map(|()| rig)
@@ -160,13 +152,12 @@ fn simulate<'py>(
     seed: u64,
     finger: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (collection, finger) = (collection(textures, trials, seed)?, finger_named(finger)?);
+    let collection = collection(textures, trials, seed)?.touched_by(finger_named(finger)?);
     let first = collection.textures[0];
     let numbers = collection.textures.clone();
     let recorded = work_on_all_cores(py, move |between| {
-        let calibration =
-            calibrated(collection.setup_with(finger, first, 0)).map_err(|why| why.raise())?;
-        let all = collection.record_with(finger, calibration, between);
+        let calibration = calibrated(collection.setup(first, 0)).map_err(|why| why.raise())?;
+        let all = collection.record(calibration, between);
         all.map_err(|why| why.raise())
     })?;
     let all = PyDict::new(py);

@@ -162,10 +162,6 @@ impl<'a> Chart<'a> {
         (LINE * lines(below, EM, WIDTH as i32 - 16).len() as i32) as u32
     }
 
-    /// Draws it.
-    ///
-    /// # Errors
-    /// See [`DrawError`].
     pub(crate) fn figure(self, id: impl Into<String>) -> Result<Figure, DrawError> {
         figure(id, &self.title, &self.about, self.size, |root| {
             Ok(self.draw(root)?.1)

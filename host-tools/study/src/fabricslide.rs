@@ -35,7 +35,6 @@ use tactus_lab::eval::experiment::{Experiment, ExperimentError};
 pub use features::BAND_EDGES;
 use features::{Meter, ROW_BYTES, TAXELS};
 
-/// Name of the manifest.
 const MANIFEST: &str = "manifest.json";
 /// Memory of a fabric in its bytes of samples: packed, twice that at most, and unpacked.
 const COPIES: u64 = 3;
@@ -88,9 +87,6 @@ pub struct FabricSlide {
 
 impl FabricSet {
     /// An experiment that learns from all slides of one repetition and is tested on the other.
-    ///
-    /// # Errors
-    /// See [`ExperimentError`].
     pub fn experiment(&self, learned_from: u8, seed: u64) -> Result<Experiment, ExperimentError> {
         let observation = |s: &FabricSlide| Observation {
             properties: Properties::new(s.properties.map(Some)),
@@ -113,10 +109,8 @@ impl FabricSet {
         Experiment::collected(names, movements, train, of(false), Some(there), seed)
     }
 
-    /// Reads and measures all fabrics of a folder.
-    ///
-    /// # Errors
-    /// If the folder, its manifest or a file of samples cannot be read, makes no sense or was changed.
+    /// Reads and measures all fabrics of a folder. Errors: the folder, its manifest or a file of samples cannot be
+    /// read, makes no sense or was changed.
     pub fn open(folder: &Path) -> Result<Self, FabricError> {
         let path = files::inside(folder, MANIFEST, MANIFEST)?;
         let bytes = files::read_bounded(&path, files::MAX_MANIFEST)?;

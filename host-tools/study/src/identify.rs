@@ -46,9 +46,6 @@ pub struct Column {
 }
 
 /// All textures with the slides to learn from, and those of [`IDENTIFIED`] with slides to test with.
-///
-/// # Errors
-/// See [`StudyError`].
 pub fn experiment(recorded: &Recorded, seed: u64) -> Result<Experiment, StudyError> {
     let Recorded {
         training,
@@ -85,9 +82,6 @@ fn config(method: Method) -> Config {
 }
 
 /// Identification at 99 % by one way of exploring.
-///
-/// # Errors
-/// See [`StudyError`].
 fn identify(
     experiment: &Experiment,
     method: Method,
@@ -135,9 +129,6 @@ pub struct PairRow {
 }
 
 /// The pairs of Table 4 at 99.9 %, by Bayesian exploration: `simulations` of each.
-///
-/// # Errors
-/// See [`StudyError`].
 pub fn pairs(
     experiment: &Experiment,
     simulations: u64,
@@ -190,9 +181,6 @@ pub struct Identification {
 
 impl Identification {
     /// Explores by every way.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
     pub fn run(
         experiment: &Experiment,
         simulations: u64,

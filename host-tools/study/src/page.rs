@@ -7,10 +7,7 @@ use minijinja::value::{Serde, Value};
 use serde::Serialize;
 use tactus_lab::data::printable::printable;
 
-/// The page that a template makes of these words and figures; `style` is the pages' CSS.
-///
-/// # Errors
-/// The template is wrong.
+/// The page that a template makes of these words and figures; `style` is the pages' CSS. Errors: The template is wrong.
 pub fn render(template: &str, page: &impl Serialize) -> Result<String, minijinja::Error> {
     let lines = SyntaxConfig::builder()
         .trim_blocks(true)

@@ -79,9 +79,6 @@ impl Pilot {
     pub const TEXTURES: u64 = PILOT_TEXTURES.len() as u64;
 
     /// Makes the slides of the pilot study, and looks for the most useful movements.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
     pub fn run(world: StudyWorld, done: impl Fn() + Sync) -> Result<Self, StudyError> {
         let movements: Vec<Movement> = Movement::grid().collect();
         let session = Session {
@@ -96,9 +93,6 @@ impl Pilot {
     }
 
     /// The results of these trials.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
     pub fn of(movements: &[Movement], trials: &[TextureTrials]) -> Result<Self, StudyError> {
         let missed = |movement: usize| {
             let of = |t: &TextureTrials| {

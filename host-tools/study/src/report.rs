@@ -102,9 +102,6 @@ pub fn prepare(folder: &Path) -> Result<Lock, ReportError> {
 }
 
 /// Writes everything of a study into its folder, the page last; or nothing, where that fails.
-///
-/// # Errors
-/// See [`ReportError`].
 pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
     let (json, page) = (
         json(study)?,
@@ -131,9 +128,6 @@ pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
 }
 
 /// study.json.
-///
-/// # Errors
-/// [`ReportError::Json`].
 pub fn json(study: &Study) -> Result<String, ReportError> {
     Ok(serde_json::to_string(study)? + "\n")
 }
@@ -172,7 +166,6 @@ impl Contents {
     }
 }
 
-/// Tables, figures and numbers of the whole study.
 fn contents(study: &Study) -> Result<Contents, DrawError> {
     let mut all = Contents::default();
     let about = json!({

@@ -85,27 +85,18 @@ pub struct Session<'a> {
 
 impl StudyWorld {
     fn collection(self) -> Collection {
-        Collection {
-            seed: self.seed,
-            textures: Vec::new(),
-            trials: 0,
-        }
+        Collection::new(self.seed, Vec::new(), 0)
     }
 
     /// The calibration that the rigs of this world share.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
     pub fn calibration(self) -> Result<RigCalibration, StudyError> {
         let world = self.seed;
         calibrated(self.collection().setup(1, 0))
             .map_err(|source| StudyError::Calibration { world, source })
     }
 
-    /// Makes all slides of a session, textures side by side; `done` is called after each texture.
-    ///
-    /// # Errors
-    /// The first fault of a rig, or slide without properties.
+    /// Makes all slides of a session, textures side by side; `done` is called after each texture. Errors: The first
+    /// fault of a rig, or slide without properties.
     pub fn record(
         self,
         session: &Session<'_>,
@@ -239,9 +230,6 @@ impl StudyWorld {
     pub const RECORDED: u64 = 117 + IDENTIFIED.len() as u64;
 
     /// Makes the slides of training and validation; `done` is called after each texture.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
     pub fn train_and_validate(self, done: impl Fn() + Sync) -> Result<Recorded, StudyError> {
         let calibration = self.calibration()?;
         let all: Vec<u8> = (1..=117).collect();

@@ -79,9 +79,6 @@ pub struct TableFile {
 
 impl Training {
     /// The results of these trials.
-    ///
-    /// # Errors
-    /// See [`StudyError`].
     pub fn of(trials: &[TextureTrials]) -> Result<Self, StudyError> {
         let movements = Collection::MOVEMENTS;
         let names: Vec<String> = trials

@@ -92,9 +92,7 @@ pub fn wear_per_mm(texture: &Texture, force_n: f64, speed_mm_s: f64) -> f64 {
 pub(crate) struct Contact<'a> {
     /// Depth by which the skin is pressed against the surface, mm; not touching if not above 0.
     pub(crate) indentation_mm: f64,
-    /// The surface under the finger.
     pub(crate) surface: Option<&'a Surface>,
-    /// Position of the finger on the sample, mm.
     pub(crate) x_mm: f64,
     /// Velocity of the finger along the sample, mm/s.
     pub(crate) speed_mm_s: f64,
@@ -227,14 +225,12 @@ impl Finger {
         self.playback = (!slides.is_empty()).then(|| Playback::new(slides, seed));
     }
 
-    /// Counts of the slides and samples played so far.
     pub(crate) fn played(&self) -> PlayCounts {
         self.playback
             .as_ref()
             .map_or_else(PlayCounts::default, Playback::counts)
     }
 
-    /// Advances by a tick.
     pub(crate) fn tick(&mut self, contact: &Contact<'_>) {
         if let Some(playback) = &mut self.playback {
             let touching = contact.surface.is_some() && contact.indentation_mm > 0.0;

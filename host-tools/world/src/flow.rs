@@ -39,7 +39,6 @@ pub(crate) const BYTE_NS: u64 = 4_000;
 const RESET_NS: u64 = 15_000_000;
 /// Stillness after which it stops, ns (chosen).
 const STOPS_NS: u64 = 600_000_000_000;
-/// Reading of an input that nothing drives.
 const FLOATING: u8 = 0xFF;
 
 /// The surface under it.

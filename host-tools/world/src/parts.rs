@@ -48,7 +48,6 @@ impl Peers {
         }
     }
 
-    /// Number of complaints of the parts.
     pub(super) fn complaints(&self) -> u64 {
         match self {
             Self::Mems(parts) => parts.accelerometer.complaints + parts.cell.complaints,
@@ -90,7 +89,6 @@ impl Peers {
         }
     }
 
-    /// A byte to the selected part; returns the part's byte.
     pub(super) fn byte(&mut self, now_ns: u64, mosi: u8, finger: &mut Finger, fraction: f64) -> u8 {
         match self {
             Self::BioTac(sensor) => {

@@ -100,9 +100,7 @@ impl Reader {
     }
 
     /// Does the start-up list. `transact` gets each of its transfers and lets time pass until the given one, ns.
-    ///
-    /// # Errors
-    /// The first answer that is not as it must be.
+    /// Errors: The first answer that is not as it must be.
     pub fn start_up(
         &self,
         at_ns: u64,

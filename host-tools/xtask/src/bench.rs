@@ -26,7 +26,6 @@ pub(crate) fn bench(options: &Options) -> Result<()> {
     run(&mut program(options.finger.as_deref())?)
 }
 
-/// Measures; an error if a gate is missed or a result is not the plain kernels'.
 pub(crate) fn gates() -> Result<()> {
     run(&mut program(None)?)
 }

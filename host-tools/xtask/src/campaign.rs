@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
 use crate::shell::{hear, root, run};
-use crate::{emulate, firmware, page};
+use crate::{emulate, firmware};
 pub(crate) use factory::{FOLDER, TABLES};
 pub(crate) use fuzz::limits;
 
@@ -55,16 +55,12 @@ enum Part {
     All,
     /// The factory tables, made again from the simulated world and compared
     Factory,
-    /// The page in a browser, with the firmware on the emulated board
-    Page,
     /// Tests that `cargo xtask test` leaves out, and all seeds of the others, in the workspace and on emulated boards
     Tests,
     /// Explorations on the emulated board
     Rig,
     /// Explorations by the handheld on the emulated board, in a hand that differs from seed to seed
     Handheld,
-    /// Power cuts at every word that the firmware stores
-    Cuts,
     /// The PC's simulated rig, which breaks at any moment of whatever its probe does
     Faults,
     /// The same on emulated boards, with the firmware
@@ -173,9 +169,7 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     );
     match (part, seeds) {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
-        (Part::Page, _) => page::emulated().map(|()| "passed".into()),
         (Part::Tests, _) => left_out(),
-        (Part::Cuts, _) => result(&mut emulate::command("cuts", &options.options)?),
         (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
         (Part::Press, Some(seeds)) => seeds::presses(&seeds),

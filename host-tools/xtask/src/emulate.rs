@@ -79,14 +79,12 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
     Ok(emulator)
 }
 
-/// A run of the emulator, which is built.
 pub(crate) fn program(run: &str) -> Command {
     let mut emulator = Command::new(target().join("debug/tactus-emulator"));
     emulator.arg(run);
     emulator
 }
 
-/// Builds the emulator.
 pub(crate) fn build() -> Command {
     let mut build = emulator("build");
     build.args(["--bin", "tactus-emulator"]);

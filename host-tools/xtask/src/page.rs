@@ -5,9 +5,8 @@ mod check;
 use anyhow::Result;
 
 pub(crate) use build::build;
-pub(crate) use check::{check, emulated};
+pub(crate) use check::check;
 
-/// Builds the page.
 pub(crate) fn page() -> Result<()> {
     let built = build("release")?;
     println!(

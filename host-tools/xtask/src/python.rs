@@ -65,7 +65,6 @@ pub(crate) fn can_build() -> Result<()> {
     Ok(())
 }
 
-/// Has pip build the package, and returns the wheel.
 pub(crate) fn wheel() -> Result<PathBuf> {
     let out = target().join("wheels");
     // an earlier version's would be found, too

@@ -130,7 +130,6 @@ fn failures(lines: &[String]) -> String {
     all
 }
 
-/// Runs one step here.
 pub(crate) fn one(name: &str) -> Result<()> {
     let steps = [&ROWS.concat(), OTHER_STEPS].concat();
     let step = steps.iter().find(|(step, _)| *step == name);
@@ -141,7 +140,6 @@ pub(crate) fn one(name: &str) -> Result<()> {
     check()
 }
 
-/// Formatting, lints, licences and unit tests.
 pub(crate) fn check() -> Result<()> {
     formatting()?;
     lints()?;
@@ -157,7 +155,6 @@ pub(crate) fn check() -> Result<()> {
 /// A step that is over: its name, the seconds that it took, and why it failed if it did.
 type Ended = (&'static str, u64, Option<String>);
 
-/// Runs every step.
 pub(crate) fn test() -> Result<()> {
     // cargo may put another program there meanwhile
     let program = &std::env::current_exe().context("cannot find this program")?;

@@ -88,11 +88,7 @@ impl Bench {
 pub(super) const UNKNOWN: u8 = 47;
 
 pub(super) fn world() -> Collection {
-    Collection {
-        seed: 5,
-        textures: vec![10, UNKNOWN, 100],
-        trials: 3,
-    }
+    Collection::new(5, vec![10, UNKNOWN, 100], 3)
 }
 
 /// Calibration and table of a probe for that world; learned once.

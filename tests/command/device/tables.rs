@@ -5,7 +5,6 @@ use std::fs;
 use tactus_core::explorer::Method;
 use tactus_core::features::{Movement, Observation, Properties};
 use tactus_core::sensor::FingerCode;
-use tactus_core::sensor::FingerName;
 use tactus_core::table::Table;
 use tactus_core::wire::Command;
 use tactus_lab::sim::collection::texture_name;
@@ -90,8 +89,8 @@ fn a_table_is_checked_pushed_and_pulled() {
 fn a_table_that_is_longer_than_a_small_sector_is_used_and_added_to() {
     let bench = Bench::new(1000);
     let movements: Vec<Movement> = Movement::grid().take(24).collect();
-    let (finger, fused) = (FingerName::Biotac, (Method::Fused, None));
-    let table = world().learn_with(finger, &movements, fused, known().0, || ());
+    let fused = (Method::Fused, None);
+    let table = world().learn_at(&movements, fused, &[], known().0, || ());
     let table = table.unwrap();
     assert!(
         (SECTOR + 1..TABLE).contains(&table.len()),

@@ -362,11 +362,11 @@ fn identify_simulated(
         None => random.random_range(1..=117),
     };
     at_least_two(args.train_slides)?;
-    let collection = Collection {
-        seed: args.seed,
-        textures: Collection::spread(unknown, args.among),
-        trials: u32::try_from(args.train_slides).context("--train-slides")?,
-    };
+    let collection = Collection::new(
+        args.seed,
+        Collection::spread(unknown, args.among),
+        u32::try_from(args.train_slides).context("--train-slides")?,
+    );
     let calibration = calibrated(collection.setup(unknown, 0))?;
     let method = args.method.unwrap_or(Method::Fused).method();
     let textures = collection.textures.len() as u64;

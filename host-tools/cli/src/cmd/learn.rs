@@ -167,10 +167,10 @@ fn with_lengths(
 }
 
 pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()> {
-    let collection = collection(&args.textures, args.trials, args.seed)?;
+    let collection = collection(&args.textures, args.trials, args.seed)?.touched_by(args.finger);
     let textures = collection.textures.len() as u64;
     let (bytes, left_out) = with_progress(textures, "sliding by hand", |done| {
-        tactus_lab::sim::handheld::learn_with(args.finger, &collection, done)
+        tactus_lab::sim::handheld::learn(&collection, done)
     })?;
     write_file(&args.out, &bytes, args.force)?;
     let out = &mut beside(&args.out, out);

@@ -39,14 +39,10 @@ pub(crate) struct Args {
 
 /// Records a collection into a folder, or what an interrupted command has not come to. Gives the number of slides that
 /// are there then.
-pub(crate) fn record(
-    collection: &Collection,
-    folder: &Path,
-    finger: FingerName,
-) -> anyhow::Result<usize> {
+pub(crate) fn record(collection: &Collection, folder: &Path) -> anyhow::Result<usize> {
     let textures = collection.textures.len();
-    let mut writer = collection.writer(folder, finger)?;
-    let calibration = calibrated(collection.setup_with(finger, collection.textures[0], 0))?;
+    let mut writer = collection.writer(folder)?;
+    let calibration = calibrated(collection.setup(collection.textures[0], 0))?;
     let each = Collection::MOVEMENTS.len() * collection.trials as usize;
     // those that an interrupted command has not come to
     let todo: Vec<(usize, u8)> = (0..)
@@ -61,7 +57,7 @@ pub(crate) fn record(
             textures: some.iter().map(|(_, number)| *number).collect(),
             ..collection.clone()
         };
-        let recorded = part.record_with(finger, calibration, || bar.inc(1))?;
+        let recorded = part.record(calibration, || bar.inc(1))?;
         for (slides, &(texture, _)) in recorded.into_iter().zip(some) {
             for slide in slides {
                 if !writer.has(texture, slide.number) {
@@ -76,9 +72,9 @@ pub(crate) fn record(
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let collection = collection(&args.textures, args.trials, args.seed)?;
+    let collection = collection(&args.textures, args.trials, args.seed)?.touched_by(args.finger);
     let textures = collection.textures.len();
-    let slides = record(&collection, &args.out, args.finger)?;
+    let slides = record(&collection, &args.out)?;
     let (folder, seed) = (args.out.display(), args.seed);
     writeln!(
         out,

@@ -86,9 +86,5 @@ pub(crate) fn collection(wanted: &[String], trials: u32, seed: u64) -> anyhow::R
     let mut textures = find_textures(wanted)?;
     textures.sort_unstable();
     textures.dedup();
-    Ok(Collection {
-        seed,
-        textures,
-        trials,
-    })
+    Ok(Collection::new(seed, textures, trials))
 }

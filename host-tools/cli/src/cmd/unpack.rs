@@ -5,7 +5,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use tactus_core::sensor::FingerName;
 use tactus_core::table::factory;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::eval::show::count;
@@ -54,7 +53,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Ok(there) if there.names() == collection.names() => (0..TEXTURES.len())
             .map(|texture| there.slides(texture).len())
             .sum(),
-        _ => simulate::record(&collection, &folder, FingerName::Biotac)?,
+        _ => simulate::record(&collection, &folder)?,
     };
     writeln!(
         out,

@@ -124,11 +124,11 @@ fn run_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
         Some(name) => find_textures(std::slice::from_ref(name))?[0],
         None => reference,
     };
-    let collection = Collection {
-        seed: args.seed,
-        textures: Collection::spread(reference, args.among),
-        trials: LEARNED,
-    };
+    let collection = Collection::new(
+        args.seed,
+        Collection::spread(reference, args.among),
+        LEARNED,
+    );
     let calibration = calibrated(collection.setup(reference, 0))?;
     let textures = collection.textures.len() as u64;
     let method = Method::Fused.method();

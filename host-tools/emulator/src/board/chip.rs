@@ -25,13 +25,10 @@ use super::taps::{Current, Encoder, Pwm, Step, Tapped, channel};
 
 /// Timers run on the internal oscillator after a reset.
 const RESET_HZ: u64 = rcc::HSI_HZ;
-/// USART3's place among rigless' serial ports.
 const USART3: usize = 2;
 
-/// TIM8's place among rigless' advanced timers.
 const TIM8: usize = 1;
 
-/// The part.
 #[derive(Debug)]
 pub(crate) struct Part {
     pub(crate) f427: Stm32f427,
@@ -179,7 +176,6 @@ impl Mcu for MemoryView {
     }
 }
 
-/// The board.
 #[derive(Debug)]
 pub(crate) struct Board {
     pub(crate) part: Part,
@@ -228,10 +224,7 @@ impl Machine for Board {
 }
 
 impl Board {
-    /// A board with a rig on its pins.
-    ///
-    /// # Errors
-    /// rigless' tables of the part do not fit together.
+    /// A board with a rig on its pins. Errors: rigless' tables of the part do not fit together.
     pub(crate) fn new(
         rig: &SharedRig,
         instructions_per_second: NonZeroU64,
@@ -254,20 +247,17 @@ impl Board {
         Ok(board)
     }
 
-    /// The level on a pin, from any driver.
     pub(crate) fn level(&mut self, pin: PinId) -> bool {
         let (gpio, registers) = self.part.f427.port(pin.port());
         gpio.level(pin.pin(), registers) == Level::High
     }
 
-    /// The tone that TIM8's channel 4 makes, Hz.
     pub(crate) fn tone(&mut self) -> Option<u32> {
         let (tim, registers) = self.part.f427.advanced_timer(TIM8);
         let pulse = tim.pulse(channel(4), registers)?;
         (pulse.period.0 > 0 && pulse.width.0 > 0).then(|| (1_000_000_000 / pulse.period.0) as u32)
     }
 
-    /// The alternate function that a pin carries, if it does.
     pub(crate) fn function(&mut self, pin: PinId) -> Option<u8> {
         let (_, registers) = self.part.f427.port(pin.port());
         Gpio::function(pin.pin(), registers)

@@ -11,7 +11,6 @@ use tactus_core::handheld::picture::{HEIGHT, Picture, WIDTH};
 
 /// SA0 to ground.
 const ADDRESS: u8 = 0x3C;
-/// The fonts of the screens.
 const FONTS: [&MonoFont<'_>; 3] = [&FONT_6X10, &FONT_7X13_BOLD, &FONT_10X20];
 
 /// The meaning of a transfer's next byte.
@@ -53,7 +52,6 @@ pub struct Display {
 }
 
 impl Default for Display {
-    /// As after its reset.
     fn default() -> Self {
         Self {
             wired: false,
@@ -141,7 +139,6 @@ impl Display {
         };
     }
 
-    /// Connects the pins to I2C1, or not.
     pub(crate) fn wire(&mut self, wired: bool) {
         self.wired = wired;
     }

@@ -18,7 +18,6 @@ use super::log::Log;
 use super::pins::{self, PinId};
 use super::referee::Referee;
 use super::rig::{SharedRig, lock};
-use super::stack::Stack;
 use super::timing::{SLOT_COUNT, Timing};
 use super::upset::Switch;
 
@@ -55,7 +54,6 @@ pub(crate) struct Driver {
     /// gets every time that is reached
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
-    pub(crate) stack: Option<Stack>,
     pub(crate) profiler: Option<HandlerProfiler>,
     pub(crate) timing: Timing,
     /// instructions since power-up, without the time that the core slept
@@ -386,9 +384,6 @@ impl emulator::Driver<Board> for Driver {
             Settled::Hit(hit) => {
                 if let Some(referee) = &mut self.referee {
                     referee.arrived(&hit, host);
-                }
-                if let Some(stack) = &mut self.stack {
-                    stack.hit(&hit, host);
                 }
                 if let Some(profiler) = &mut self.profiler {
                     profiler.hit(&hit, host);

@@ -25,7 +25,6 @@ use super::options::Options;
 use super::pins::{self, PinId};
 use super::referee::{Referee, Violation};
 use super::rig::{Rig, SharedRig, lock};
-use super::stack::{Stack, StackLayout, StackUse};
 use super::symbols::symbols;
 use super::timing::Timing;
 use super::upset::Switch;
@@ -78,7 +77,6 @@ impl Emulator {
             commands: commanded,
             reached: reaches,
             log,
-            stack: None,
             profiler: None,
             timing: Timing::default(),
             instructions: 0,
@@ -135,7 +133,6 @@ impl Emulator {
         }
     }
 
-    /// The reason why the run is over.
     fn end(&mut self) -> Error {
         self.commands = None;
         match self.thread.take().map(JoinHandle::join) {
@@ -150,10 +147,8 @@ impl Emulator {
         self.now_ns
     }
 
-    /// Goes on to a virtual time, ns; one that is past is now.
-    ///
-    /// # Errors
-    /// [`Error::Ended`] if the firmware ended the run by semihosting, else the emulator's.
+    /// Goes on to a virtual time, ns; one that is past is now. Errors: [`Error::Ended`] if the firmware ended the run
+    /// by semihosting, else the emulator's.
     pub fn run_until(&mut self, until_ns: u64) -> Result<(), Error> {
         if until_ns <= self.now_ns {
             return Ok(());
@@ -342,10 +337,7 @@ impl Emulator {
     }
 
     /// Makes the flash's interrupt clear its flags without waking a task, by new code for its handler. Returns the
-    /// original code and its address.
-    ///
-    /// # Errors
-    /// [`Error::Symbol`] and [`Error::NoSpace`].
+    /// original code and its address. Errors: [`Error::Symbol`] and [`Error::NoSpace`].
     pub fn lose_flash_interrupts(&mut self) -> Result<(u64, Vec<u8>), Error> {
         const HANDLER: &str = "FLASH";
         let (address, size) = self.symbol(HANDLER)?;
@@ -460,24 +452,7 @@ impl Emulator {
         self.with(|standing| std::mem::take(&mut standing.driver.timing))
     }
 
-    /// Measures the depth of the stack from now on. To be called at time 0: it paints the whole stack. Costs most of
-    /// the speed.
-    pub(crate) fn measure_stack(&mut self, layout: StackLayout) -> Result<(), Error> {
-        self.with(|standing| standing.driver.stack = Some(Stack::new(layout, standing.host)))
-    }
-
-    /// The use of the stack since [`Emulator::measure_stack`]; `None` without it.
-    pub(crate) fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
-        self.with(|standing| {
-            let stack = standing.driver.stack.as_mut();
-            stack.map(|stack| stack.found(standing.host))
-        })
-    }
-
     /// The address and the size, in bytes, of the one symbol that has `name` as its path or in it.
-    ///
-    /// # Errors
-    /// [`Error::Symbol`].
     pub fn symbol(&self, name: &str) -> Result<(u64, u64), Error> {
         let exact: Vec<_> = self.symbols.iter().filter(|(n, ..)| n == name).collect();
         let found = if exact.is_empty() {
@@ -502,9 +477,6 @@ impl Emulator {
     }
 
     /// Reads memory.
-    ///
-    /// # Errors
-    /// [`Error::Memory`].
     pub fn read(&mut self, address: u64, length: u64) -> Result<Vec<u8>, Error> {
         self.with(move |standing| {
             let bytes = (address..address + length).map(|address| {
@@ -518,9 +490,6 @@ impl Emulator {
 
     /// Writes memory, flash too: to break code on purpose, put `[0xFE, 0xE7]`, a branch to itself, or `[0x00, 0xDE]`,
     /// an undefined instruction, at the address of a function.
-    ///
-    /// # Errors
-    /// [`Error::Memory`].
     pub fn write(&mut self, address: u64, bytes: &[u8]) -> Result<(), Error> {
         let bytes = bytes.to_vec();
         self.with(move |standing| {

@@ -61,7 +61,6 @@ impl FlashWrite {
         })
     }
 
-    /// The erase of these addresses.
     pub(crate) fn erase(addresses: &Range<u64>) -> Option<Self> {
         let all = FIRST..FIRST + 12;
         let snb = all.filter(|_| STORE.contains(&addresses.start));

@@ -21,7 +21,6 @@ const TIMERS: [(Register, u64, u64); 6] = [
     (Register::DbgmcuApb2Fz, 1 << 0, 0x4001_0000),
     (Register::DbgmcuApb2Fz, 1 << 1, 0x4001_0400),
 ];
-/// CEN of a timer's CR1.
 const CEN: u64 = 1;
 /// DBG_IWDG_STOP of APB1_FZ.
 const IWDG_STOP: u64 = 1 << 12;
@@ -29,7 +28,6 @@ const APB1_FZ: u64 = 0xE004_2008;
 const IWDG_KR: u64 = 0x4000_3000;
 const RELOAD: u64 = 0xAAAA;
 
-/// A halt under way.
 #[derive(Debug)]
 pub(super) struct Halt {
     /// CR1 of the timers that ran and stand now.
@@ -71,7 +69,6 @@ impl Halt {
         }
     }
 
-    /// The core continues.
     pub(super) fn end(self, part: &mut Part, at: VirtualNanos) {
         for cr1 in self.standing {
             let now = part.read(at, cr1, Width::W32).unwrap_or_default();

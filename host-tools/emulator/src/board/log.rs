@@ -31,7 +31,6 @@ impl Log {
         })
     }
 
-    /// Takes what the firmware wrote.
     pub(crate) fn drain(&mut self, now_ns: u64, host: &mut dyn Host) {
         let mut word = |offset| host.read(self.block + offset, Width::W32).unwrap_or(0);
         let (size, write) = (word(SIZE), word(WRITE));

@@ -45,12 +45,10 @@ impl MotionPeer {
         self.control = cr1;
     }
 
-    /// Connects the pins to SPI4, or not.
     pub(crate) fn wire(&mut self, wired: bool) {
         self.wired = wired;
     }
 
-    /// Its chip select.
     pub(crate) fn select(&mut self, selected: bool) {
         if selected != self.selected
             && let Some(flow) = &mut self.flow

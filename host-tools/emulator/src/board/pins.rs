@@ -12,7 +12,6 @@ impl PinId {
         self.0.into()
     }
 
-    /// Its number in the port.
     pub(crate) fn number(self) -> u8 {
         self.1
     }
@@ -60,11 +59,8 @@ pub const STAGE_ENABLE: PinId = PinId(C, 8);
 pub(crate) const ENCODER: [PinId; 2] = [PinId(D, 12), PinId(D, 13)];
 /// Normally closed to ground; high is actuated, or a cut wire.
 pub(crate) const LEVER_TOP: PinId = PinId(F, 12);
-/// As [`LEVER_TOP`].
 pub(crate) const E_STOP: PinId = PinId(F, 13);
-/// As [`LEVER_TOP`].
 pub(crate) const STAGE_LOWER: PinId = PinId(F, 14);
-/// As [`LEVER_TOP`].
 pub(crate) const STAGE_UPPER: PinId = PinId(F, 15);
 /// Clock and data of the handheld's display, with I2C1's alternate function.
 pub(crate) const DISPLAY_I2C: [PinId; 2] = [PinId(B, 8), PinId(B, 9)];

@@ -2,13 +2,10 @@
 
 use tactus_world::world::Truth;
 
-/// Less force is no contact, N.
 pub(crate) const CONTACT_N: f64 = 0.05;
 /// A slower stage does not slide, mm/s.
 const SLIDES_MM_S: f64 = 1.0;
-/// Shorter movements are no slides, s.
 const SHORTEST_S: f64 = 0.3;
-/// Acceleration of the reference stage, mm/s^2.
 const ACCELERATION_MM_S2: f64 = 1000.0;
 /// After the ramp the stage settles for so long, s.
 const SETTLING_S: f64 = 0.2;
@@ -51,7 +48,6 @@ pub struct Touch {
     pub ended_ns: Option<u64>,
 }
 
-/// Takes notes.
 #[derive(Debug, Default)]
 pub(crate) struct Recorder {
     slides: Vec<Slide>,

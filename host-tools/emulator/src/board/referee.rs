@@ -47,7 +47,6 @@ const PORTS: [&str; 11] = [
 enum Wants {
     /// One pin or several.
     Pins,
-    /// One pin.
     OnePin,
     /// At most one pin.
     NoTwo,
@@ -83,7 +82,6 @@ const STARTS: [Start; 3] = [
     ),
 ];
 
-/// The judge of one run.
 #[derive(Debug)]
 pub(crate) struct Referee {
     vendor: &'static Vendor,
@@ -131,7 +129,6 @@ impl Referee {
         referee
     }
 
-    /// The chip starts anew.
     pub(crate) fn reset(&mut self) {
         let words = self.vendor.words();
         self.written = words.map(|(address, word)| (address, word.reset)).collect();
@@ -176,7 +173,6 @@ impl Referee {
         self.tell(now, Rule::NoHandler, name.to_owned());
     }
 
-    /// The violations, by rule.
     pub(crate) fn found(&self) -> Vec<Violation> {
         self.found.values().cloned().collect()
     }
@@ -208,13 +204,11 @@ impl Referee {
         Some((word & mask) >> mask.trailing_zeros())
     }
 
-    /// The bits of a field.
     fn bits(&self, of: &Peripheral, register: &str, name: &str) -> u32 {
         let place = self.vendor.field(of.name, register, name);
         place.map_or(0, |(_, bits)| bits)
     }
 
-    /// An access of the core, once it is made.
     pub(crate) fn access(&mut self, access: &Access) {
         let Some(now) = Now::of(access) else { return };
         if self.accelerator.is_missed(now.at_ns) {

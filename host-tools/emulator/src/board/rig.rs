@@ -167,11 +167,11 @@ impl Rig {
         &self.display
     }
 
-    pub(crate) fn display_mut(&mut self) -> &mut Display {
+    /// The same, to pull its plug.
+    pub fn display_mut(&mut self) -> &mut Display {
         &mut self.display
     }
 
-    /// Sets the buzzer's tone, Hz.
     pub(crate) fn buzzer(&mut self, now_ns: u64, tone: Option<u32>) {
         if tone != self.tone {
             self.tone = tone;
@@ -341,7 +341,6 @@ impl Rig {
         [miso, mosi, a, b]
     }
 
-    /// CR1 of SPI1.
     pub(crate) fn spi_control(&mut self, cr1: u64) {
         self.spi_control = cr1;
     }
@@ -408,14 +407,12 @@ impl Rig {
         }
     }
 
-    /// A byte from the firmware.
     pub(crate) fn hear(&mut self, now_ns: u64, byte: u8) {
         if let Some(byte) = self.on_the_line(now_ns, byte) {
             self.heard.push((now_ns, byte));
         }
     }
 
-    /// The next byte to the firmware.
     pub(crate) fn say(&mut self, now_ns: u64) -> Option<u8> {
         let byte = self.to_say.pop_front()?;
         self.on_the_line(now_ns, byte)

@@ -8,14 +8,12 @@ const SLOT_COUNTS_PER_US: f64 = 84.0;
 /// TIM3's first compare register: the servo writes the stage's duty there in each of its periods.
 const DUTY: u64 = 0x4000_0434;
 
-/// The measured punctuality.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Timing {
     /// Commands that ended.
     pub commands: u64,
     /// The latest end of one after its slot began, us.
     pub(crate) command_us: f64,
-    /// Periods of the servo.
     pub(crate) servo_periods: u64,
     /// The longest time between two of them, us.
     pub(crate) servo_gap_us: f64,

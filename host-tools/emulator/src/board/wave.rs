@@ -7,9 +7,7 @@ use tactus_world::ripple::PwmPhase;
 pub(super) struct Wave {
     /// Time of the reading of its count, ns.
     pub(super) at_ns: u64,
-    /// The count.
     pub(super) count: u64,
-    /// Counts of a period.
     pub(super) counts: u64,
     /// Counts in a second.
     pub(super) hz: u64,

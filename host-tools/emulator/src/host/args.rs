@@ -20,9 +20,6 @@ pub struct Firmware {
 impl Firmware {
     /// Shows its SHA-256 before anything is drawn or learned: this proves that the firmware was not made for the
     /// texture. On stdout it is for people; programs want nothing there but the result.
-    ///
-    /// # Errors
-    /// [`Error::Read`].
     pub fn show(&self, on_stdout: bool) -> Result<String, Error> {
         let elf = std::fs::read(&self.elf).map_err(|source| Error::Read {
             path: self.elf.clone(),

@@ -1,87 +1,16 @@
-//! An arm that holds the finger of the emulated board: moved by the simulator's own program, or through a TCP port by a
-//! program in any language, as a real arm's controller is by its driver.
+//! An arm that holds the finger of the emulated board, moved through a TCP port by a program in any language, as a real
+//! arm's controller is by its driver.
 
 use std::io::{BufRead as _, BufReader, ErrorKind, Write as _};
 use std::net::{TcpListener, TcpStream};
 
-use tactus_core::wire::{self, Command, Event, MAX_FRAME, Report, Request};
 use tactus_world::arm::Arm;
-use tactus_world::arm_program::ArmProgram;
 
 use crate::board::Emulator;
-
-/// Ids of requests that no session of a host comes to while one is tested.
-const FIRST_ID: u16 = 0x8000;
 
 /// Puts the finger on an arm.
 pub fn mount(board: &mut Emulator, seed: u64) {
     board.rig().world().mount_on(Arm::new(seed));
-}
-
-/// The simulator's program at an arm, and its place on the line beside a host.
-#[derive(Debug)]
-pub struct OnTheLine {
-    program: ArmProgram,
-    id: u16,
-    now_ms: u64,
-}
-
-impl OnTheLine {
-    /// A program that waits for orders; the finger is put on its arm.
-    pub fn new(board: &mut Emulator, seed: u64) -> Self {
-        mount(board, seed);
-        Self {
-            program: ArmProgram::new(seed),
-            id: FIRST_ID,
-            now_ms: board.now_ns() / 1_000_000,
-        }
-    }
-
-    /// The program.
-    pub fn program(&mut self) -> &mut ArmProgram {
-        &mut self.program
-    }
-
-    /// Takes a report of the probe.
-    pub fn hear(&mut self, report: &Report) {
-        match &report.event {
-            Event::Arm(order) => self.program.ask(*order),
-            Event::Live(live) => self.program.force(f64::from(live.force_mn) * 1e-3),
-            _ => {}
-        }
-    }
-
-    /// Takes each report, and `None` after each look, of a [`Talk`](super::talk::Talk).
-    pub fn follow(&mut self, board: &mut Emulator, report: Option<&Report>) {
-        match report {
-            Some(report) => self.hear(report),
-            None => self.look(board),
-        }
-    }
-
-    /// Goes on to the board's time: to be called every ms.
-    pub(crate) fn look(&mut self, board: &mut Emulator) {
-        let now_ms = board.now_ns() / 1_000_000;
-        while self.now_ms < now_ms {
-            self.now_ms += 1;
-            let reports = match board.rig().world().arm() {
-                Some(arm) => self.program.tick(arm),
-                None => return,
-            };
-            for report in reports {
-                let command = Command::Arm(report);
-                let mut buffer = [0; MAX_FRAME + 1];
-                self.id = self.id.wrapping_add(1) | FIRST_ID;
-                let request = Request {
-                    id: self.id,
-                    command,
-                };
-                if let Ok(frame) = wire::encode(&request, &mut buffer) {
-                    board.send(frame);
-                }
-            }
-        }
-    }
 }
 
 /// An arm behind a TCP port. A line "ALONG UP" commands velocities, mm/s; they hold until the next one, or until the
@@ -97,10 +26,6 @@ pub(crate) struct ArmPort {
 const SAYS_MS: u64 = 10;
 
 impl ArmPort {
-    /// Listens.
-    ///
-    /// # Errors
-    /// The port cannot be had.
     pub(crate) fn bind(port: u16) -> std::io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", port))?;
         listener.set_nonblocking(true)?;
@@ -111,10 +36,6 @@ impl ArmPort {
         })
     }
 
-    /// Address on which it listens.
-    ///
-    /// # Errors
-    /// The system does not say.
     pub(crate) fn address(&self) -> std::io::Result<std::net::SocketAddr> {
         self.listener.local_addr()
     }

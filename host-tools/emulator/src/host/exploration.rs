@@ -61,7 +61,6 @@ pub struct Exploration {
     pub found: Verdict,
     /// Slides that the probe has learned from by itself.
     pub learned: u8,
-    /// From power-up to the end, virtual seconds.
     pub(crate) virtual_s: f64,
     /// The ground truth of every slide, and its movement.
     pub slides: Vec<(Movement, Slide)>,
@@ -75,7 +74,6 @@ pub struct Exploration {
     pub resets: usize,
     /// The PC's agreement.
     pub agreement: Agreement,
-    /// The parts that the PC could not compare.
     pub(crate) not_followed: Vec<String>,
     /// Reports that came damaged or not at all.
     pub lost_reports: u64,
@@ -190,7 +188,6 @@ impl Exploration {
         (newtons, share)
     }
 
-    /// Error of the force of each slide.
     fn force_errors(&self) -> Vec<f64> {
         let each = self.slides.iter();
         let each = each

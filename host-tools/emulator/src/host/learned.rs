@@ -11,9 +11,8 @@ use super::args::World;
 use super::progress;
 use super::under_finger::{self, FirmwareData, TRIALS, UnderFingerError, Unknown};
 
-/// The source of the textures.
 enum Textures {
-    Simulated(FingerName, Collection),
+    Simulated(Collection),
     Recorded(RecordedTexture),
 }
 
@@ -45,17 +44,14 @@ impl Chosen {
             }
             None => random.random_range(1..=117),
         };
-        let collection = Collection {
-            seed: cli.seed,
-            textures: Collection::spread(texture, cli.among),
-            trials: TRIALS,
-        };
+        let textures = Collection::spread(texture, cli.among);
+        let collection = Collection::new(cli.seed, textures, TRIALS).touched_by(cli.finger);
         // trials that nothing was learned from
         let trial = 1 + u64::from(random.next_u32() % 1000);
         Ok(Self {
-            unknown: under_finger::mounted_with(cli.finger, &collection, texture, trial),
+            unknown: under_finger::mounted(&collection, texture, trial),
             seed: random.next_u32(),
-            textures: Textures::Simulated(cli.finger, collection),
+            textures: Textures::Simulated(collection),
         })
     }
 
@@ -63,17 +59,16 @@ impl Chosen {
     pub fn learn(&self, method: Method) -> Result<FirmwareData, UnderFingerError> {
         let bar;
         let known = match &self.textures {
-            Textures::Simulated(finger, collection) => {
+            Textures::Simulated(collection) => {
                 let count = collection.textures.len() as u64;
                 bar = progress::bar("learning textures", count, ", {eta} left");
                 let done = || bar.inc(1);
                 // the image of the other fingers ends no slide early, nor does the paper's method
-                match (finger, method) {
-                    (FingerName::Biotac, Method::Fused) => {
-                        under_finger::simulated_early(collection, method, done)?
-                    }
-                    _ => under_finger::simulated_with(*finger, collection, method, done)?,
-                }
+                let lengths_ms = match (collection.finger, method) {
+                    (FingerName::Biotac, Method::Fused) => &Collection::LENGTHS_MS[..],
+                    _ => &[],
+                };
+                under_finger::simulated(collection, method, lengths_ms, done)?
             }
             Textures::Recorded(recorded_texture) => {
                 bar = progress::spinner("learning materials");

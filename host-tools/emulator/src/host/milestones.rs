@@ -37,7 +37,6 @@ impl Milestones {
         }
     }
 
-    /// Returns the time from power-up to ready, s.
     pub(crate) fn seconds_to_ready(&self) -> Option<f64> {
         Some(self.ready_ns? as f64 * 1e-9)
     }

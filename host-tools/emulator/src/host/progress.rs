@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A line that names the current work.
 pub(crate) fn spinner(what: &'static str) -> ProgressBar {
     ticking(ProgressBar::new_spinner().with_message(what))
 }

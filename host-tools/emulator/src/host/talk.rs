@@ -136,9 +136,7 @@ impl Talk {
     }
 
     /// Runs the board until `pick` returns a value for a report; `each` gets all of them, and `None` after every look.
-    ///
-    /// # Errors
-    /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
+    /// Errors: [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time.
     pub fn wait<T>(
         &mut self,
         timeout_s: f64,
@@ -162,10 +160,8 @@ impl Talk {
         Err(TalkError::Silent(timeout_s))
     }
 
-    /// Does an operation; `each` gets all reports meanwhile, and `None` after every look.
-    ///
-    /// # Errors
-    /// [`TalkError::Silent`] if that takes longer than `timeout_s` of virtual time; see also [`TalkError`].
+    /// Does an operation; `each` gets all reports meanwhile, and `None` after every look. Errors: [`TalkError::Silent`]
+    /// if that takes longer than `timeout_s` of virtual time.
     pub fn operate<T>(
         &mut self,
         operation: impl Future<Output = Result<T, OperationError>>,
@@ -198,9 +194,6 @@ impl Talk {
     }
 
     /// Runs a transaction to its end, as [`operate`](Self::operate) does.
-    ///
-    /// # Errors
-    /// See [`operate`](Self::operate).
     pub fn run<E: Transaction>(
         &mut self,
         transaction: E,

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_core::sensor::FingerName;
 use tactus_lab::data::recordings::{RecordingError, RecordingSet};
 use tactus_lab::sim::collection::{Collection, LearnError, calibrated, texture_name};
 use tactus_lab::sim::recorded::RecordedTexture;
@@ -82,58 +81,26 @@ impl Unknown {
     }
 }
 
-/// Learns the textures of a simulated world for a method; `done` is called after each.
+/// Learns the textures of a simulated world for a method, with statistics of slides after these lengths, ms; `done` is
+/// called after each.
 pub fn simulated(
     collection: &Collection,
     method: Method,
-    done: impl Fn() + Sync,
-) -> Result<FirmwareData, UnderFingerError> {
-    simulated_with(FingerName::Biotac, collection, method, done)
-}
-
-/// The same with another finger than a BioTac.
-pub fn simulated_with(
-    finger: FingerName,
-    collection: &Collection,
-    method: Method,
-    done: impl Fn() + Sync,
-) -> Result<FirmwareData, UnderFingerError> {
-    let first = collection.textures.first().copied().unwrap_or(1);
-    let setup = collection.setup_with(finger, first, 0);
-    let calibration = calibrated(setup).map_err(LearnError::from)?;
-    let movements = &Collection::MOVEMENTS;
-    let table = collection.learn_with(finger, movements, (method, None), calibration, done)?;
-    Ok(FirmwareData { calibration, table })
-}
-
-/// As [`simulated`], with statistics of shorter slides: the rig's image ends slides as soon as it is certain.
-pub fn simulated_early(
-    collection: &Collection,
-    method: Method,
+    lengths_ms: &[u16],
     done: impl Fn() + Sync,
 ) -> Result<FirmwareData, UnderFingerError> {
     let first = collection.textures.first().copied().unwrap_or(1);
     let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
-    let lengths_ms = &Collection::LENGTHS_MS;
-    let table = collection.learn_lengths(method, calibration, lengths_ms, done)?;
+    let (movements, how) = (&Collection::MOVEMENTS, (method, None));
+    let table = collection.learn_at(movements, how, lengths_ms, calibration, done)?;
     Ok(FirmwareData { calibration, table })
 }
 
 /// A texture of a simulated world in a trial that nothing was learned from: those from 1 on.
 pub fn mounted(collection: &Collection, texture: u8, trial: u64) -> Unknown {
-    mounted_with(FingerName::Biotac, collection, texture, trial)
-}
-
-/// The same with another finger than a BioTac.
-pub fn mounted_with(
-    finger: FingerName,
-    collection: &Collection,
-    texture: u8,
-    trial: u64,
-) -> Unknown {
     Unknown {
         name: texture_name(texture).to_owned(),
-        setup: collection.setup_with(finger, texture, trial),
+        setup: collection.setup(texture, trial),
         recorded: None,
     }
 }
@@ -177,9 +144,6 @@ pub fn recorded(
 }
 
 /// Number of a material by its name, in any case, or by its number from 1.
-///
-/// # Errors
-/// [`UnderFingerError::NoMaterial`].
 pub fn material(recorded_texture: &RecordedTexture, name: &str) -> Result<usize, UnderFingerError> {
     let number = name.parse().ok().map(|n: usize| n.wrapping_sub(1));
     let mut names = recorded_texture.names.iter();

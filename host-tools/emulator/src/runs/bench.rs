@@ -2,7 +2,6 @@
 //! instructions that it counted are read, and the plain kernels do the same on this PC.
 
 mod counter;
-pub(crate) mod error;
 mod gates;
 mod inputs;
 mod on_the_rig;
@@ -14,22 +13,19 @@ pub mod workload;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::bail;
 use clap::Args as Arguments;
 use serde_json::Value;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::Identify;
-use tactus_lab::eval::learn::{TableError, know_lengths};
-use tactus_lab::sim::collection::Collection;
 
 use self::counter::Bench;
-use self::error::BenchError;
 use self::gates::{GATES, gate};
-use self::inputs::{SLIDE, Wanted, extremes, observed, of_gates, slide};
+use self::inputs::{SLIDE, extremes, observed, of_gates, slide};
 use self::on_the_rig::on_the_rig;
 use self::row::{Row, print};
 use self::workload::Workload;
-use super::error::RunError;
 use crate::host::args::{Firmware, Format};
 
 /// What is counted.
@@ -62,9 +58,10 @@ fn one_slide() -> Identify {
 
 /// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
 const MISSED: u8 = 2;
+const DIFFERENT: &str = "not what the plain kernels give: ";
 
 /// Counts, and says by its exit code whether every gate is met.
-pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let met = count(args)?;
     Ok(if met {
         ExitCode::SUCCESS
@@ -73,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode, RunError> {
     })
 }
 
-fn count(args: &Args) -> Result<bool, BenchError> {
+fn count(args: &Args) -> anyhow::Result<bool> {
     let text = args.format == Format::Text;
     if let Some(rig) = args
         .rig
@@ -98,8 +95,7 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         slow = Some(slowed::slowed(rig, slowed::WORST_RATIO * slowed::RESERVE));
         let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
         if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
-            let (kernel, what) = ((*name).to_owned(), "it has a gate and was not counted");
-            return Err(BenchError::Unsuitable { kernel, what });
+            bail!("{name}: it has a gate and was not counted");
         }
     }
     if text {
@@ -111,9 +107,9 @@ fn count(args: &Args) -> Result<bool, BenchError> {
         println!("{}", Value::from_iter(rows.iter().map(Row::json)));
     }
     let different = rows.iter().filter(|row| !row.equal);
-    let different: Vec<String> = different.map(|row| row.kernel.clone()).collect();
+    let different: Vec<&str> = different.map(|row| row.kernel.as_str()).collect();
     if !different.is_empty() {
-        return Err(BenchError::Different(different));
+        bail!(DIFFERENT.to_owned() + &different.join("; "));
     }
     let in_time = slow.is_none_or(|slowed| slowed::missed(&slowed).is_empty());
     Ok(in_time && rows.iter().all(Row::ok))
@@ -160,7 +156,7 @@ impl<'a> Kernel<'a> {
         }
     }
 
-    fn count(self, bench: &mut Bench) -> Result<Row, BenchError> {
+    fn count(self, bench: &mut Bench) -> anyhow::Result<Row> {
         let counted = bench.count(self.workload, self.table, self.words)?;
         let units = self.units as f64;
         Ok(Row {
@@ -176,7 +172,7 @@ impl<'a> Kernel<'a> {
 }
 
 /// The core's kernels as a rig with 117 textures uses them, on a slide.
-fn kernels(bench: &mut Bench, samples: &[i16]) -> Result<Vec<Row>, BenchError> {
+fn kernels(bench: &mut Bench, samples: &[i16]) -> anyhow::Result<Vec<Row>> {
     let name = "band-pass FIR with mean power";
     let band_power = Kernel {
         units: SLIDE,
@@ -192,59 +188,11 @@ fn kernels(bench: &mut Bench, samples: &[i16]) -> Result<Vec<Row>, BenchError> {
         frame.cmsis(2.0 * 14_162.0).count(bench)?,
         all.cmsis(1_650_000.0).count(bench)?,
     ];
-    for method in [Method::Paper, Method::Fused] {
+    for (name, method) in [("paper", Method::Paper), ("fused", Method::Fused)] {
         let table = of_gates(method)?;
-        rows.extend(decisions(bench, samples, &table, method)?);
+        let words = [&observed(&table, method)?[..], &samples[..SLIDE]].concat();
+        let (name, unit) = (format!("last sample to decision, {name}"), "decision");
+        rows.push(Kernel::new(name, unit, Workload::Decision, &table, &words).count(bench)?);
     }
-    rows.push(look(bench)?);
     Ok(rows)
-}
-
-/// What decisions take with a table.
-fn decisions(
-    bench: &mut Bench,
-    samples: &[i16],
-    table: &[u8],
-    method: Method,
-) -> Result<Vec<Row>, BenchError> {
-    let is_paper = method == Method::Paper;
-    let name = if is_paper { "paper" } else { "fused" };
-    let [many, few] = [50, 20].map(|live| observed(table, method, live));
-    let (many, few) = (many?, few?);
-    let words = &many.words[..];
-    let last = [words, &samples[..SLIDE]].concat();
-    let kernel = |what: &str, unit, workload, words| {
-        Kernel::new(format!("{what}, {name}"), unit, workload, table, words)
-    };
-    let choice = |observed: &Wanted| format!("choice among {} live textures", observed.live);
-    let mut posterior = kernel("posterior", "117 textures", Workload::Observe, words);
-    let first = kernel("first choice", "choice", Workload::FirstChoice, words);
-    let mut of_many = kernel(&choice(&many), "choice", Workload::Choice, words);
-    let of_few = kernel(&choice(&few), "choice", Workload::Choice, &few.words);
-    let decision = "last sample to decision";
-    let decision = kernel(decision, "decision", Workload::Decision, &last);
-    let begin = kernel("an explorer begins", "exploration", Workload::Begin, words);
-    if is_paper {
-        posterior = posterior.cmsis(23_412.0);
-        of_many = Kernel {
-            floor: Some(154_000.0),
-            ..of_many.cmsis(251_000.0)
-        };
-    }
-    let kernels = [posterior, first, of_many, of_few, decision, begin].into_iter();
-    let is_counted = |kernel: &Kernel<'_>| !(is_paper && kernel.words == few.words);
-    kernels
-        .filter(is_counted)
-        .map(|kernel| kernel.count(bench))
-        .collect()
-}
-
-/// What a look at a slide takes that may end early: by a table whose three lengths say the same as the whole slide.
-fn look(bench: &mut Bench) -> Result<Row, BenchError> {
-    let whole = of_gates(Method::Fused)?;
-    let words = observed(&whole, Method::Fused, 50)?.words;
-    let lengths = Collection::LENGTHS_MS.map(|ms| (ms, whole.clone(), u64::MAX));
-    let table = know_lengths(&whole, &lengths).map_err(TableError::from)?;
-    let name = "a look at a slide, fused";
-    Kernel::new(name, "117 textures", Workload::Look, &table, &words).count(bench)
 }

@@ -15,7 +15,6 @@ use tactus_lab::sim::fault_case::naming::Naming;
 use tactus_lab::sim::fault_case::{Bench, Case, Outcome};
 
 use self::board::{BoardBench, BoardCase};
-use super::error::RunError;
 use crate::host::progress;
 
 /// Breaks one to three things at any moment of whatever the probe does, case by case: on the simulated rig of the PC,
@@ -41,8 +40,7 @@ pub(crate) struct Args {
     elf: Option<PathBuf>,
 }
 
-/// Runs all cases; true if they are as they must be.
-pub(crate) fn run(args: &Args) -> Result<bool, RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     let bar = progress::bar("cases", args.faults, ", {eta} left");
     let bench = Bench::new(factory::RIG)?;
     let board = args.elf.as_ref();
@@ -119,7 +117,6 @@ mod tests {
             named: Vec::new(),
             naming: Naming::Right,
             wrong: wrong.iter().map(|what| (*what).to_owned()).collect(),
-            took: Default::default(),
         };
         let (text, met) = summary(&[Ok(outcome(&[]))]);
         assert!(

@@ -1,22 +1,24 @@
 //! An exploration by the handheld's firmware: a hand presses and slides, and the display says what it is.
 
+use anyhow::{Context as _, anyhow};
 use clap::Args as Arguments;
 use serde_json::json;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Counts, Event};
-use tactus_lab::sim::scenario::{Scenario, Step, texture};
+use tactus_lab::sim::collection::{Collection, texture_name, texture_number};
 use tactus_link::Session;
 use tactus_world::person::Manner;
 use tactus_world::textures::TEXTURES;
 
-use super::error::RunError;
 use crate::board::{Display, Emulator, Error};
 use crate::host::args::{Firmware, Format};
+use crate::host::hand::{Holder, SLIDE_S, Seen};
 use crate::host::milestones::Milestones;
-use crate::scenario::{self, PlayError, Seen};
+use crate::host::under_finger::UnderFingerError;
 
 /// The firmware's table is of this world.
 const WORLD: u64 = 1;
+const NO_VERDICT: &str = "the display shows no verdict";
 /// How the slides are meant: as the display asks for them.
 const FORCE_N: f64 = 0.5;
 const PACE_MM_S: f64 = 25.0;
@@ -26,6 +28,8 @@ const SLIDES: u32 = 40;
 const MEAN_NS: u64 = 100_000_000;
 /// Until then the status is here.
 const ANSWERED_MS: u64 = 200;
+/// Time by which the firmware hears its host, s.
+const BOOTED_S: f64 = 0.5;
 /// Letters that the rows below a headline have at most: longer texts are headlines.
 const ROW: usize = 11;
 /// Letters of a headline in the smallest font, and of a name before its question mark.
@@ -51,7 +55,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac)]
     finger: FingerName,
     /// How long the hand slides each time, s
-    #[arg(long, value_name = "S", default_value_t = Step::EXPLORED_S, value_parser = slide_s)]
+    #[arg(long, value_name = "S", default_value_t = SLIDE_S, value_parser = slide_s)]
     slide_s: f64,
     /// For people, or a line of JSON at the end for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
@@ -59,23 +63,21 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    fn scenario(&self, truth: &str) -> Scenario {
-        Scenario {
-            about: "an exploration".to_owned(),
-            texture: truth.to_owned(),
-            world: WORLD,
-            seed: self.seed,
-            hand: Manner {
-                // the hand holds it level
-                tilt_mm: self.motion.then_some(0.0),
-                ..Manner::default()
-            },
-            step: vec![Step::Explore {
-                force_n: FORCE_N,
-                pace_mm_s: PACE_MM_S,
-                slides: SLIDES,
-                seconds: self.slide_s,
-            }],
+    /// Has a hand explore this texture, whose host sends these bytes once it is heard.
+    fn explore(&self, texture: u8, host: &[u8]) -> anyhow::Result<Holder> {
+        let collection = Collection::new(WORLD, Vec::new(), 1).touched_by(self.finger);
+        let setup = collection.setup(texture, 100 * self.seed);
+        let hand = Manner {
+            // the hand holds it level
+            tilt_mm: self.motion.then_some(0.0),
+            ..Manner::default()
+        };
+        let mut holder = Holder::start(&self.firmware.elf, setup, hand, None)?;
+        holder.wait(BOOTED_S)?;
+        holder.board.send(host);
+        match holder.explore(FORCE_N, PACE_MM_S, SLIDES, self.slide_s)? {
+            true => Ok(holder),
+            false => Err(anyhow!(NO_VERDICT)),
         }
     }
 }
@@ -95,18 +97,17 @@ enum VerdictKind {
     Unknown,
 }
 
-/// Has a hand explore, and says what the display told it.
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let text = args.format == Format::Text;
     let sha256 = args.firmware.show(text)?;
-    let truth = match &args.texture {
+    let number = match &args.texture {
         Some(name) => {
-            let number = texture(name).map_err(PlayError::from)?;
-            TEXTURES[usize::from(number) - 1].name
+            texture_number(name).ok_or_else(|| UnderFingerError::NoTexture(name.clone()))?
         }
         // neighbours of the table are alike
-        None => TEXTURES[(args.seed * 31) as usize % TEXTURES.len()].name,
+        None => TEXTURES[(args.seed * 31) as usize % TEXTURES.len()].number,
     };
+    let truth = texture_name(number);
     if text {
         println!(
             "An unknown texture in a hand. Under the finger: {truth} (seed {}).",
@@ -117,10 +118,8 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let mut status = Vec::new();
     // a request for the status is never too long
     let _ = session.request(Command::Status, &mut status);
-    let scenario = args.scenario(truth);
-    let played = scenario::play_to(&scenario, args.finger, &args.firmware.elf, None, &status)?;
-    let mut board = played.board;
-    let times = milestones(&board, &played.seen);
+    let Holder { mut board, looks } = args.explore(number, &status)?;
+    let times = milestones(&board, &looks);
     let heard = Heard::of(&mut board, session)?;
     let seconds = board.now_ns() as f64 * 1e-9;
     // negative where the verdict was there before the hand stood
@@ -129,7 +128,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let end_to_screen_s = stood_ns
         .zip(written_ns)
         .map(|(from, to)| (to as f64 - from as f64) * 1e-9);
-    let told = told(board.rig().display()).ok_or(RunError::NoVerdict)?;
+    let told = told(board.rig().display()).context(NO_VERDICT)?;
     let (says, verdict) = match told {
         VerdictKind::Sure(name) if name == truth => (format!("It is {name}."), "Right"),
         VerdictKind::Sure(name) => (format!("It is {name}."), "Wrong"),

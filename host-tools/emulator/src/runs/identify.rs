@@ -3,12 +3,12 @@
 use std::io::Write as _;
 use std::time::Instant;
 
+use anyhow::bail;
 use clap::Args as Arguments;
 use tactus_core::table::Table;
 use tactus_core::wire::{Event, Identify, Report};
 use tactus_lab::eval::show::{Show, count, is_right};
 
-use super::error::RunError;
 use crate::board::{self, Emulator, Options};
 use crate::host::args::{Format, World};
 use crate::host::exploration::{self, Exploration, ExploreError};
@@ -28,7 +28,6 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// Prints what the firmware logged.
 pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
     for (at_ns, line) in board.log()? {
         eprintln!("{:10.3} s  {line}", at_ns as f64 * 1e-9);
@@ -36,8 +35,7 @@ pub(crate) fn print_log(board: &mut Emulator) -> Result<(), board::Error> {
     Ok(())
 }
 
-/// Has the firmware identify what lies under its finger, and shows it as it goes.
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let world = &args.world;
     let text = args.format == Format::Text;
     let sha256 = world.firmware.show(text)?;
@@ -121,11 +119,10 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     std::io::stdout().flush()?;
     match explored.missed() {
         missed if missed.is_empty() => Ok(()),
-        missed => Err(RunError::Missed(missed)),
+        missed => bail!("not as it must be: {}", missed.join("; ")),
     }
 }
 
-/// Prints times, errors and the PC's agreement.
 fn summary(explored: &Exploration, times: &Milestones, wall_s: f64, recorded: bool) {
     println!(
         "{}{:.1} s of the board's time in {wall_s:.1} s. Force {:.1} %, speed {:.2} % off at most; slots within \

@@ -4,9 +4,9 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
+use anyhow::anyhow;
 use clap::Args as Arguments;
 
-use super::error::RunError;
 use super::identify::print_log;
 use crate::board::{Emulator, Options};
 use crate::host::args::World;
@@ -31,7 +31,7 @@ pub(crate) struct Args {
 const STEP_MS: u64 = 1;
 
 /// Gives the line to whoever connects last, until the process ends.
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let Args {
         world,
         port,
@@ -39,10 +39,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     } = args;
     world.firmware.show(true)?;
     let chosen = Chosen::new(world)?;
-    let listener = TcpListener::bind(("127.0.0.1", *port)).map_err(|source| RunError::Listen {
-        port: *port,
-        source,
-    })?;
+    let listener = TcpListener::bind(("127.0.0.1", *port)).map_err(|why| in_use(*port, &why))?;
     listener.set_nonblocking(true)?;
     let mut board = chosen
         .unknown
@@ -50,7 +47,7 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
     let mut arm = None;
     if let Some(port) = *arm_port {
         mount(&mut board, world.seed);
-        let bound = ArmPort::bind(port).map_err(|source| RunError::Listen { port, source })?;
+        let bound = ArmPort::bind(port).map_err(|why| in_use(port, &why))?;
         println!("arm at {}", bound.address()?);
         arm = Some(bound);
     }
@@ -81,6 +78,10 @@ pub(crate) fn run(args: &Args) -> Result<(), RunError> {
         let ahead = Duration::from_nanos(board.now_ns()).saturating_sub(began.elapsed());
         std::thread::sleep(ahead);
     }
+}
+
+fn in_use(port: u16, why: &std::io::Error) -> anyhow::Error {
+    anyhow!("cannot listen on port {port}: {why}. Is it in use? 0 takes any free one")
 }
 
 fn exchange(stream: &mut TcpStream, said: &[u8], board: &mut Emulator) -> std::io::Result<()> {

@@ -1,14 +1,17 @@
-//! How deep the rig's stack gets: a line of JSON, bytes, for `cargo xtask size`.
+//! How deep the rig's stack gets: a line of JSON, bytes, for `cargo xtask size`. The stack is painted before the first
+//! instruction, and what is left of the paint in the end was never used.
 
+use std::ops::Range;
 use std::path::Path;
 
+use anyhow::ensure;
 use clap::Args as Arguments;
-use serde_json::{Value, json};
-use tactus_core::wire::{Command, Event, Identify, Phase};
+use object::{Object as _, ObjectSymbol as _};
+use serde_json::json;
+use tactus_core::wire::{Command, Event, Identify};
 use tactus_world::world::Setup;
 
-use super::error::RunError;
-use crate::board::{Emulator, Options, StackLayout, StackLevel, StackUse};
+use crate::board::{Emulator, Error, Options};
 use crate::host::args::Firmware;
 use crate::host::talk::Talk;
 
@@ -24,42 +27,39 @@ pub(crate) struct Args {
 
 /// Longer than it takes, virtual seconds.
 const TIMEOUT_S: f64 = 120.0;
+const PAINT: u8 = 0x7A;
 
-/// Measures the stack of the rig's firmware while it identifies a texture among those of its factory table.
-pub(crate) fn run(args: &Args) -> Result<(), RunError> {
-    let elf = &args.firmware.elf;
-    let mut layout = StackLayout::of(elf)?;
-    let found = loop {
-        let found = explore(elf, layout.clone(), args.slides)?;
-        if !found.incomplete {
-            break found;
-        }
-        eprintln!("a handler went deeper than was looked at: once more");
-        layout.levels = found.levels;
+/// Addresses of the stack of an ELF that cortex-m-rt was linked into.
+fn stack(path: &Path) -> Result<Range<u64>, Error> {
+    let elf = std::fs::read(path).map_err(|source| Error::Read {
+        path: path.into(),
+        source,
+    })?;
+    let file = object::File::parse(&*elf).map_err(|source| Error::Elf {
+        path: path.into(),
+        source,
+    })?;
+    let named = |name: &str| {
+        let found = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        let found = found.ok_or_else(|| Error::Symbol {
+            name: name.into(),
+            count: 0,
+            examples: String::new(),
+        });
+        found.map(|symbol| symbol.address())
     };
-    let level = |level: &StackLevel| json!({"name": level.name, "runs": level.runs, "deepest": level.deepest});
-    let thread = json!({"name": "thread mode", "deepest": found.thread});
-    let ran = found.levels.iter().filter(|level| level.runs > 0);
-    let levels = std::iter::once(thread).chain(ran.map(level));
-    let bound = found.bound();
-    println!(
-        "{}",
-        json!({"levels": Value::from_iter(levels), "used": found.used, "bound": bound})
-    );
-    Ok(())
+    Ok(named("__euninit")?..named("_stack_start")?)
 }
 
-fn explore(elf: &Path, layout: StackLayout, slides: u8) -> Result<StackUse, RunError> {
+/// Measures the stack of the rig's firmware while it identifies a texture among those of its factory table.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let (elf, slides) = (&args.firmware.elf, args.slides);
+    let stack = stack(elf)?;
+    let length = stack.end - stack.start;
     let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
-    emulator.measure_stack(layout)?;
+    emulator.write(stack.start, &vec![PAINT; length as usize])?;
     let mut talk = Talk::new(emulator);
-    // the firmware homes the rig when it starts
-    let homed = talk.wait(
-        TIMEOUT_S,
-        |_, _| {},
-        |event| matches!(event, Event::Phase(Phase::Ready)).then_some(Ok(())),
-    );
-    homed?;
+    talk.ready(|_, _| ())?;
     let mut observed = 0;
     let identify = Identify {
         threshold: 1.0,
@@ -79,6 +79,12 @@ fn explore(elf: &Path, layout: StackLayout, slides: u8) -> Result<StackUse, RunE
             );
         }
     })?;
-    let measured = talk.board().stack_use()?;
-    measured.filter(|_| observed > 0).ok_or(RunError::NoSlide)
+    ensure!(
+        observed > 0,
+        "the exploration had no slide: the stack that was measured says nothing"
+    );
+    let left = talk.board().read(stack.start, length)?;
+    let used = left.iter().skip_while(|byte| **byte == PAINT).count();
+    println!("{}", json!({ "used": used }));
+    Ok(())
 }

@@ -6,21 +6,90 @@ use std::path::Path;
 use tactus_core::explorer::Method;
 use tactus_core::features::FeatureSet;
 use tactus_core::rig::Fault;
-use tactus_core::sensor::FingerName;
-use tactus_core::wire::{Command, Event, Identify, Verdict};
-use tactus_emulator::board::Options;
-use tactus_emulator::host::arm::OnTheLine;
+use tactus_core::wire::{
+    self, Command, Event, Identify, MAX_FRAME, Report, Request as Frame, Verdict,
+};
+use tactus_emulator::board::{Emulator, Options};
+use tactus_emulator::host::arm::mount;
 use tactus_emulator::host::talk::{Talk, TalkError};
 use tactus_emulator::host::under_finger::mounted;
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_link::Request;
-use tactus_world::arm_program::Misbehaves;
+use tactus_world::arm_program::{ArmProgram, Misbehaves};
 
 use crate::common::elf_of;
 
 const TEXTURE: u8 = 60;
+/// Ids of requests that no session of a host comes to while one is tested.
+const FIRST_ID: u16 = 0x8000;
 /// The finger must never feel more, N.
 const MOST_N: f64 = 2.2;
+
+/// The simulator's program at an arm, and its place on the line beside a host.
+#[derive(Debug)]
+struct OnTheLine {
+    program: ArmProgram,
+    id: u16,
+    now_ms: u64,
+}
+
+impl OnTheLine {
+    /// A program that waits for orders; the finger is put on its arm.
+    fn new(board: &mut Emulator, seed: u64) -> Self {
+        mount(board, seed);
+        Self {
+            program: ArmProgram::new(seed),
+            id: FIRST_ID,
+            now_ms: board.now_ns() / 1_000_000,
+        }
+    }
+
+    /// The program.
+    fn program(&mut self) -> &mut ArmProgram {
+        &mut self.program
+    }
+
+    /// Takes a report of the probe.
+    fn hear(&mut self, report: &Report) {
+        match &report.event {
+            Event::Arm(order) => self.program.ask(*order),
+            Event::Live(live) => self.program.force(f64::from(live.force_mn) * 1e-3),
+            _ => {}
+        }
+    }
+
+    /// Takes each report, and `None` after each look, of a [`Talk`].
+    fn follow(&mut self, board: &mut Emulator, report: Option<&Report>) {
+        match report {
+            Some(report) => self.hear(report),
+            None => self.look(board),
+        }
+    }
+
+    /// Goes on to the board's time: to be called every ms.
+    fn look(&mut self, board: &mut Emulator) {
+        let now_ms = board.now_ns() / 1_000_000;
+        while self.now_ms < now_ms {
+            self.now_ms += 1;
+            let reports = match board.rig().world().arm() {
+                Some(arm) => self.program.tick(arm),
+                None => return,
+            };
+            for report in reports {
+                let command = Command::Arm(report);
+                let mut buffer = [0; MAX_FRAME + 1];
+                self.id = self.id.wrapping_add(1) | FIRST_ID;
+                let request = Frame {
+                    id: self.id,
+                    command,
+                };
+                if let Ok(frame) = wire::encode(&request, &mut buffer) {
+                    board.send(frame);
+                }
+            }
+        }
+    }
+}
 
 /// A board on an arm that knows some textures, and what it came to: how the exploration ended, its verdict, its faults,
 /// the largest force by the world, N, and whether the line of permission is high.
@@ -33,16 +102,12 @@ struct Explored {
 }
 
 fn explore(elf: &Path, max_slides: u8, how: Option<Misbehaves>) -> Explored {
-    let world = Collection {
-        seed: 1,
-        textures: Collection::spread(TEXTURE, 4),
-        trials: 2,
-    };
+    let world = Collection::new(1, Collection::spread(TEXTURE, 4), 2);
     let calibration = calibrated(world.setup(TEXTURE, 0)).unwrap();
-    let (finger, movements) = (FingerName::Biotac, &Collection::MOVEMENTS);
+    let movements = &Collection::MOVEMENTS;
     let bands = (Method::Fused, Some(FeatureSet::Bands));
     let table = world
-        .learn_with(finger, movements, bands, calibration, || ())
+        .learn_at(movements, bands, &[], calibration, || ())
         .unwrap();
     let unknown = mounted(&world, TEXTURE, 3);
     let mut talk = Talk::new(unknown.start(elf, Options::default()).unwrap());

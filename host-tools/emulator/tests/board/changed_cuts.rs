@@ -7,13 +7,13 @@ use tactus_core::explorer::Method;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Event, Identify, Report, Reset};
 use tactus_emulator::board::{Emulator, FlashWrite, Options};
-use tactus_emulator::host::power_cut::{Cut, Torn, left_by};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, Unknown};
 use tactus_lab::sim::collection::Collection;
 use tactus_link::{ReadTable, Request};
 
 use crate::common::{boot, elf, with_limits_of_change};
+use crate::power_cut::{Cut, Torn, left_by};
 
 /// The texture under the finger, which the table has, and textures of the table.
 const TEXTURE: u8 = 47;
@@ -63,12 +63,8 @@ pub(crate) fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> (Talk, Ve
 #[test]
 fn an_answer_over_the_link_is_stored_or_not() {
     let Some(elf) = elf() else { return };
-    let collection = Collection {
-        seed: 3,
-        textures: Collection::spread(TEXTURE, AMONG),
-        trials: 3,
-    };
-    let known = under_finger::simulated(&collection, Method::Fused, || ()).unwrap();
+    let collection = Collection::new(3, Collection::spread(TEXTURE, AMONG), 3);
+    let known = under_finger::simulated(&collection, Method::Fused, &[], || ()).unwrap();
     let unknown = under_finger::mounted(&collection, TEXTURE, 2);
     let mut talk = boot(&elf, &unknown, None);
     let changed = with_limits_of_change(&known.table, ALL_CHANGED);

@@ -61,11 +61,7 @@ fn troubles(elf: &Path, store: Vec<u8>) -> (Talk, Vec<Failure>) {
         store: Some(store),
         ..Options::default()
     };
-    let world = Collection {
-        seed: 3,
-        textures: Vec::new(),
-        trials: 0,
-    };
+    let world = Collection::new(3, Vec::new(), 0);
     let mut talk = Talk::new(mounted(&world, 31, 9).start(elf, options).unwrap());
     let mut told = Vec::new();
     let ready = talk.ready(|_, report| {

@@ -17,12 +17,9 @@ use crate::common::{boot, elf};
 pub(crate) fn world() -> &'static (Collection, FirmwareData) {
     static WORLD: OnceLock<(Collection, FirmwareData)> = OnceLock::new();
     WORLD.get_or_init(|| {
-        let collection = Collection {
-            seed: 3,
-            textures: Collection::spread(47, 6),
-            trials: 5,
-        };
-        let known = under_finger::simulated(&collection, Method::Fused.method(), || ()).unwrap();
+        let collection = Collection::new(3, Collection::spread(47, 6), 5);
+        let known =
+            under_finger::simulated(&collection, Method::Fused.method(), &[], || ()).unwrap();
         (collection, known)
     })
 }

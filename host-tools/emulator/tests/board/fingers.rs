@@ -8,7 +8,7 @@ use tactus_core::wire::{Command, Event, Identify, Phase, Report};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_emulator::host::exploration::explore;
 use tactus_emulator::host::talk::Talk;
-use tactus_emulator::host::under_finger::{mounted_with, simulated_with};
+use tactus_emulator::host::under_finger::{mounted, simulated};
 use tactus_lab::sim::collection::Collection;
 use tactus_world::faults::Fault as Broken;
 use tactus_world::parts::PartFault;
@@ -38,13 +38,9 @@ fn board(finger: FingerName) -> Option<Emulator> {
 
 fn boots_and_identifies(finger: FingerName) {
     let Some(elf) = elf() else { return };
-    let world = Collection {
-        seed: 1,
-        textures: Collection::spread(60, 4),
-        trials: 2,
-    };
-    let known = simulated_with(finger, &world, Method::Fused, || ()).unwrap();
-    let unknown = mounted_with(finger, &world, 60, 3);
+    let world = Collection::new(1, Collection::spread(60, 4), 2).touched_by(finger);
+    let known = simulated(&world, Method::Fused, &[], || ()).unwrap();
+    let unknown = mounted(&world, 60, 3);
     let mut talk = Talk::new(unknown.start(&elf, Options::default()).unwrap());
     let mut booted = None;
     let fault = talk.ready(|_, report| {

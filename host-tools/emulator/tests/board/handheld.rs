@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use tactus_core::sensor::FingerName;
 use tactus_emulator::board::Emulator;
-use tactus_lab::sim::scenario::Scenario;
 
 use crate::common::elf_of;
+use crate::scenario::Scenario;
 
 const SCENARIOS: [&str; 7] = [
     "again", "faults", "known", "rest", "spell", "teach", "uneven",
@@ -24,9 +23,9 @@ fn elf() -> Option<PathBuf> {
 /// Plays a scenario; what holds of all of them is looked at here. `None` without an ELF.
 fn play(name: &str) -> Option<(Emulator, Vec<String>)> {
     let elf = elf()?;
-    let scenario = Scenario::read(&folder().join(format!("{name}.json"))).unwrap();
-    let mut board = tactus_emulator::scenario::play(&scenario, FingerName::Biotac, &elf, None)
-        .unwrap_or_else(|why| panic!("{name}: {why}"));
+    eprintln!("scenario {name}");
+    let scenario = std::fs::read(folder().join(format!("{name}.json"))).unwrap();
+    let mut board = Scenario::parse(&scenario).play(&elf);
     let log: Vec<String> = board
         .log()
         .unwrap()
@@ -83,9 +82,7 @@ fn it_sleeps_between_samples_and_when_nobody_wants_any() {
 fn the_share_of_time_awake_is_true() {
     let Some(elf) = elf() else { return };
     let ready = br#"{"about": "", "texture": "burlap", "step": [{"see": {"text": ["Press", "and hold"]}}]}"#;
-    let ready = Scenario::parse(ready).unwrap();
-    let mut board =
-        tactus_emulator::scenario::play(&ready, FingerName::Biotac, &elf, None).unwrap();
+    let mut board = Scenario::parse(ready).play(&elf);
     let clock_hz = tactus_emulator::board::Options::default().instructions_per_second;
     let awake = |board: &mut Emulator, what: &str| {
         board.run_ms(1000).unwrap();

@@ -8,7 +8,6 @@ use tactus_core::sensor::FingerName;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Command, Event, Forget, Identify, Phase, Prompt, Report, Status};
 use tactus_emulator::board::{Emulator, Options};
-use tactus_emulator::host::person::Person;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk, TalkError};
 use tactus_lab::sim::collection::Collection;
 use tactus_lab::sim::handheld::ground;
@@ -19,6 +18,7 @@ use tactus_world::person::Manner;
 use tactus_world::world::Setup;
 
 use crate::common::elf_of;
+use crate::person::Person;
 
 /// Longest exploration or training by hand, virtual seconds.
 const LONG_S: f64 = 120.0;
@@ -44,12 +44,8 @@ impl Held {
     }
 
     pub(crate) fn with(elf: &Path, texture: &str, manner: Manner, store: Option<Vec<u8>>) -> Self {
-        let collection = Collection {
-            seed: 1,
-            textures: vec![BURLAP],
-            trials: 1,
-        };
-        let number = tactus_lab::sim::scenario::texture(texture).unwrap();
+        let collection = Collection::new(1, vec![BURLAP], 1);
+        let number = tactus_lab::sim::collection::texture_number(texture).unwrap();
         let setup = collection.setup(number, 77);
         Self::of(elf, setup, manner, store)
     }

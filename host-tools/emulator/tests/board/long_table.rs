@@ -5,11 +5,9 @@ use std::path::Path;
 
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
-use tactus_core::sensor::FingerName;
 use tactus_core::table::{Change, Name, Table, amend};
 use tactus_core::wire::{Command, Forget, Identify, Train};
 use tactus_emulator::board::FlashWrite;
-use tactus_emulator::host::power_cut::{Cut, Torn, left_by};
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, FirmwareData, Unknown};
 use tactus_lab::sim::collection::{Collection, calibrated};
@@ -17,6 +15,7 @@ use tactus_link::{PushTable, ReadTable, Request};
 
 use crate::changed_cuts::reboot;
 use crate::common::{boot, elf};
+use crate::power_cut::{Cut, Torn, left_by};
 
 /// The texture under the finger, which the tables have.
 const TEXTURE: u8 = 47;
@@ -27,11 +26,7 @@ const LONG: usize = (64 << 10) - 32;
 const LONG_S: f64 = 300.0;
 
 fn world() -> Collection {
-    Collection {
-        seed: 3,
-        textures: Collection::spread(TEXTURE, 4),
-        trials: 5,
-    }
+    Collection::new(3, Collection::spread(TEXTURE, 4), 5)
 }
 
 fn under_finger() -> Unknown {
@@ -40,11 +35,11 @@ fn under_finger() -> Unknown {
 
 /// Tables of 24 movements, and of the usual three.
 fn tables() -> (FirmwareData, Vec<u8>) {
-    let short = under_finger::simulated(&world(), Method::Fused, || ()).unwrap();
+    let short = under_finger::simulated(&world(), Method::Fused, &[], || ()).unwrap();
     let movements: Vec<Movement> = Movement::grid().take(24).collect();
     let calibration = calibrated(world().setup(world().textures[0], 0)).unwrap();
-    let (finger, fused) = (FingerName::Biotac, (Method::Fused, None));
-    let long = world().learn_with(finger, &movements, fused, calibration, || ());
+    let fused = (Method::Fused, None);
+    let long = world().learn_at(&movements, fused, &[], calibration, || ());
     let long = long.unwrap();
     assert!(short.table.len() <= SHORT && long.len() > SHORT && long.len() < LONG);
     (short, long)

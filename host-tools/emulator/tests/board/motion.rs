@@ -40,11 +40,7 @@ const LEVEL: Manner = Manner {
 
 /// A table of some textures that knows how they go with the speed.
 fn paced_table() -> Vec<u8> {
-    let collection = Collection {
-        seed: 1,
-        textures: vec![10, 47, 64, 80, 100],
-        trials: 8,
-    };
+    let collection = Collection::new(1, vec![10, 47, 64, 80, 100], 8);
     let known: Vec<_> = collection
         .textures
         .iter()

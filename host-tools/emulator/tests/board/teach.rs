@@ -25,12 +25,8 @@ fn world() -> &'static (Collection, FirmwareData) {
     WORLD.get_or_init(|| {
         let textures = Collection::spread(OLD, 8);
         assert!(!textures.contains(&NEW) && textures.contains(&OLD));
-        let collection = Collection {
-            seed: 3,
-            textures,
-            trials: 5,
-        };
-        let known = under_finger::simulated(&collection, Method::Fused, || ()).unwrap();
+        let collection = Collection::new(3, textures, 5);
+        let known = under_finger::simulated(&collection, Method::Fused, &[], || ()).unwrap();
         (collection, known)
     })
 }

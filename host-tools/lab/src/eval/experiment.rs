@@ -488,7 +488,6 @@ impl<'e> Run<'e> {
         )
     }
 
-    /// As [`Run::learn`], without some of the textures.
     pub(crate) fn learn_without(
         &self,
         method: Method,

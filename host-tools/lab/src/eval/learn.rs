@@ -167,7 +167,7 @@ pub struct ObservedTrial {
 /// each trial was observed at.
 pub fn learn_lengths(
     expected: &Expected,
-    method: Method,
+    (method, features): (Method, Option<FeatureSet>),
     names: &[String],
     movements: &[Movement],
     lengths_ms: &[u16],
@@ -179,9 +179,12 @@ pub fn learn_lengths(
             .iter()
             .map(|row| row.iter().map(of).collect())
             .collect();
-        learn_for(expected, method, None, names, movements, &slides)
+        learn_for(expected, method, features, names, movements, &slides)
     };
     let whole = learn(&|trial| trial.whole.clone())?;
+    if lengths_ms.is_empty() {
+        return Ok(whole);
+    }
     let shorter = lengths_ms.iter().enumerate().map(|(n, &ms)| {
         let first = |trial: &ObservedTrial| trial.first.get(n).cloned().flatten();
         let is_longer = |movement: usize| {

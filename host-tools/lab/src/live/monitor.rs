@@ -21,7 +21,6 @@ const BINS: usize = 4;
 
 #[derive(Default)]
 pub(crate) struct Received {
-    /// P_AC of still finger and slide, counts about the still finger's, at 2200 Hz.
     pub(crate) pac: Vec<i16>,
     /// Spectra of the last 233 ms, one every 64 samples: dB of the mean power of four bins, of 17.2 Hz together.
     pub(crate) spectra: Vec<Vec<i8>>,
@@ -206,7 +205,6 @@ impl ProbeMonitor {
         }
     }
 
-    /// A texture was learned, and the table is this one now.
     pub(crate) fn learned(&mut self) {
         for happening in &mut self.received.happened {
             if let Happening::Learned { known, .. } = happening {

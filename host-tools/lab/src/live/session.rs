@@ -152,11 +152,11 @@ impl Session {
             return Err("drift is 0 to 10 times the usual".into());
         }
         self.running = None;
-        let collection = Collection {
-            seed: settings.world,
-            textures: Collection::spread(1, settings.textures),
-            trials: TRIALS,
-        };
+        let collection = Collection::new(
+            settings.world,
+            Collection::spread(1, settings.textures),
+            TRIALS,
+        );
         let trials = if settings.world == WORLD {
             let mut all = Trials::of_world()?;
             all.retain(|trials| collection.textures.contains(&trials.texture));

@@ -29,11 +29,7 @@ impl Trials {
         texture: u8,
         calibration: RigCalibration,
     ) -> Result<Self, TrialError> {
-        let collection = Collection {
-            seed: world,
-            textures: vec![texture],
-            trials: TRIALS,
-        };
+        let collection = Collection::new(world, vec![texture], TRIALS);
         let setup = collection.setup(texture, 0);
         let movements = &Collection::MOVEMENTS;
         let slides = record_texture(setup, calibration, movements, TRIALS)?;
@@ -92,7 +88,14 @@ pub(super) fn table(trials: &[Trials], paper: bool, drift: f32) -> Result<Vec<u8
     let slides: Vec<_> = trials.iter().map(|t| t.movements.clone()).collect();
     let movements = &Collection::MOVEMENTS;
     let lengths_ms = &Collection::LENGTHS_MS;
-    let table = learn_lengths(&expected, method, &names, movements, lengths_ms, &slides)?;
+    let table = learn_lengths(
+        &expected,
+        (method, None),
+        &names,
+        movements,
+        lengths_ms,
+        &slides,
+    )?;
     let named = name_finger(&table, FingerCode::of(FingerName::Biotac), 0, "");
     named.map_err(|why: EncodeError| why.into())
 }

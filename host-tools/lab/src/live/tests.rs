@@ -6,11 +6,7 @@ const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/live/world-1.trials
 
 #[test]
 fn the_trials_that_come_with_the_program_are_what_the_world_gives() {
-    let world = Collection {
-        seed: WORLD,
-        textures: vec![1],
-        trials: TRIALS,
-    };
+    let world = Collection::new(WORLD, vec![1], TRIALS);
     let calibration = calibrated(world.setup(1, 0)).unwrap();
     let make = |texture: u8| Trials::make(WORLD, texture, calibration).unwrap();
     if std::env::var("TACTUS_TRIALS").as_deref() == Ok("write") {

@@ -20,7 +20,6 @@ use tactus_link::person::{self, QuestionKind};
 use tactus_link::probe::{GREETING, TIMEOUT};
 use tactus_link::{OperationError, PortError, Probe};
 
-/// The work that the page asked for, and its state.
 #[derive(Default)]
 struct Desk {
     work: Option<Work>,

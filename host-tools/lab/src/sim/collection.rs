@@ -27,9 +27,27 @@ pub struct Collection {
     pub textures: Vec<u8>,
     /// Trials of each texture and movement.
     pub trials: u32,
+    /// What touches them.
+    pub finger: FingerName,
 }
 
 impl Collection {
+    /// Textures that a BioTac touches.
+    pub fn new(seed: u64, textures: Vec<u8>, trials: u32) -> Self {
+        Self {
+            seed,
+            textures,
+            trials,
+            finger: FingerName::Biotac,
+        }
+    }
+
+    /// The same with another finger.
+    #[must_use]
+    pub fn touched_by(self, finger: FingerName) -> Self {
+        Self { finger, ..self }
+    }
+
     /// The movements of the study.
     pub const MOVEMENTS: [Movement; 3] = [
         Movement::FOR_TRACTION,
@@ -54,18 +72,14 @@ impl Collection {
 
     /// Begins a folder of recordings of it, or continues one that was interrupted.
     /// Errors: the folder cannot be written, or holds other recordings.
-    pub fn writer(
-        &self,
-        folder: &Path,
-        finger: FingerName,
-    ) -> Result<RecordingWriter, RecordingError> {
+    pub fn writer(&self, folder: &Path) -> Result<RecordingWriter, RecordingError> {
         let named = self.textures.iter().map(|&number| Texture {
             id: number.into(),
             name: texture_name(number).to_owned(),
         });
         let numbers: Vec<String> = self.textures.iter().map(u8::to_string).collect();
         let (seed, trials, numbers) = (self.seed, self.trials, numbers.join(","));
-        let finger_said = match finger {
+        let finger_said = match self.finger {
             FingerName::Biotac => String::new(),
             other => format!(" --finger {other}"),
         };
@@ -73,7 +87,7 @@ impl Collection {
             "tactus simulate --seed {seed} --trials {trials} --textures {numbers}{finger_said}"
         );
         let labels = Labels {
-            finger: FingerCode::of(finger),
+            finger: FingerCode::of(self.finger),
             ..Labels::default()
         };
         let writer = RecordingWriter::begin(folder, named.collect(), &command)?;
@@ -92,15 +106,8 @@ impl Collection {
                 .wrapping_mul(1009)
                 + trial,
             finger_seed: self.seed,
+            finger: self.finger,
             ..Setup::default()
-        }
-    }
-
-    /// The same with another finger than a BioTac.
-    pub fn setup_with(&self, finger: FingerName, texture: u8, trial: u64) -> Setup {
-        Setup {
-            finger,
-            ..self.setup(texture, trial)
         }
     }
 
@@ -112,31 +119,19 @@ impl Collection {
             .collect()
     }
 
-    /// Records all trials of all textures, textures side by side; `done` is called after each. Returns the slides of
-    /// each texture in the order of time.
+    /// Records all trials of all textures at the movements of the study, textures side by side; `done` is called after
+    /// each. Returns the slides of each texture in the order of time.
     /// Errors: the first fault of a rig.
     pub fn record(
         &self,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<Vec<Recording>>, TrialError> {
-        self.record_with(FingerName::Biotac, calibration, done)
-    }
-
-    /// The same with another finger than a BioTac.
-    /// Errors: the first fault of a rig.
-    pub fn record_with(
-        &self,
-        finger: FingerName,
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<Vec<Recording>>, TrialError> {
-        self.record_at(finger, &Self::MOVEMENTS, calibration, done)
+        self.record_at(&Self::MOVEMENTS, calibration, done)
     }
 
     fn record_at(
         &self,
-        finger: FingerName,
         movements: &[Movement],
         calibration: RigCalibration,
         done: impl Fn() + Sync,
@@ -145,7 +140,7 @@ impl Collection {
             .par_iter()
             .enumerate()
             .map(|(index, &texture)| {
-                let setup = self.setup_with(finger, texture, 0);
+                let setup = self.setup(texture, 0);
                 let mut slides = record_texture(setup, calibration, movements, self.trials)?;
                 for slide in &mut slides {
                     slide.texture = index;
@@ -156,62 +151,38 @@ impl Collection {
             .collect()
     }
 
-    /// Learns a texture table for a method from trials of all textures with a BioTac, at the movements of the study.
+    /// Learns a texture table for a method from trials of all textures at the movements of the study.
     pub fn learn(
         &self,
         method: Method,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
-        let movements = &Self::MOVEMENTS;
-        self.learn_with(
-            FingerName::Biotac,
-            movements,
-            (method, None),
-            calibration,
-            done,
-        )
+        self.learn_at(&Self::MOVEMENTS, (method, None), &[], calibration, done)
     }
 
-    /// The same with any finger and movements; the fused method learns these features, or the best there are. Band
-    /// powers alone are for a rig that does not measure shear, as one that an arm moves.
-    pub fn learn_with(
+    /// The same at these movements; the fused method learns these features, or the best there are (band powers alone are
+    /// for a rig that does not measure shear). With statistics of slides after each of these lengths, in ms at constant
+    /// speed, the shortest first.
+    /// Errors: the first fault of a rig, or slide without properties; lengths that no table has.
+    pub fn learn_at(
         &self,
-        finger: FingerName,
         movements: &[Movement],
         (method, features): (Method, Option<FeatureSet>),
-        calibration: RigCalibration,
-        done: impl Fn() + Sync,
-    ) -> Result<Vec<u8>, LearnError> {
-        let slides = self.record_at(finger, movements, calibration, done)?;
-        let trials = self.observe_all(movements, &slides, &[])?;
-        let whole =
-            |cell: &Vec<ObservedTrial>| cell.iter().map(|trial| trial.whole.clone()).collect();
-        let slides: Vec<Vec<Vec<Observation>>> = trials
-            .iter()
-            .map(|cells| cells.iter().map(whole).collect())
-            .collect();
-        let table = learn::learn(method, features, &self.names(), movements, &slides)?;
-        let named = learn::name_finger(&table, FingerCode::of(finger), 0, "");
-        Ok(named.map_err(TableError::from)?)
-    }
-
-    /// As [`Collection::learn`], with statistics of slides after each of these lengths, in ms at constant speed, the
-    /// shortest first.
-    /// Errors: the first fault of a rig, or slide without properties; lengths that no table has.
-    pub fn learn_lengths(
-        &self,
-        method: Method,
-        calibration: RigCalibration,
         lengths_ms: &[u16],
+        calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
-        let slides = self.record(calibration, done)?;
-        let trials = self.observe_all(&Self::MOVEMENTS, &slides, lengths_ms)?;
-        let usual = Expected::default();
-        let (names, movements) = (self.names(), &Self::MOVEMENTS);
-        let table = learn::learn_lengths(&usual, method, &names, movements, lengths_ms, &trials)?;
-        let named = learn::name_finger(&table, FingerCode::of(FingerName::Biotac), 0, "");
+        let slides = self.record_at(movements, calibration, done)?;
+        let plan = Plan::new();
+        let textures = slides.iter().zip(&self.textures);
+        let trials: Vec<Vec<Vec<ObservedTrial>>> = textures
+            .map(|(slides, &texture)| self.observe(&plan, movements, texture, slides, lengths_ms))
+            .collect::<Result<_, TrialError>>()?;
+        let (usual, how) = (Expected::default(), (method, features));
+        let table =
+            learn::learn_lengths(&usual, how, &self.names(), movements, lengths_ms, &trials)?;
+        let named = learn::name_finger(&table, FingerCode::of(self.finger), 0, "");
         Ok(named.map_err(TableError::from)?)
     }
 
@@ -245,19 +216,6 @@ impl Collection {
             observed.collect()
         };
         movements.iter().map(of_movement).collect()
-    }
-
-    fn observe_all(
-        &self,
-        movements: &[Movement],
-        slides: &[Vec<Recording>],
-        lengths_ms: &[u16],
-    ) -> Result<Vec<Vec<Vec<ObservedTrial>>>, TrialError> {
-        let plan = Plan::new();
-        let textures = slides.iter().zip(&self.textures);
-        textures
-            .map(|(slides, &texture)| self.observe(&plan, movements, texture, slides, lengths_ms))
-            .collect()
     }
 }
 

@@ -21,7 +21,7 @@ use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault as Named, Phase};
 use tactus_core::sensor::biotac;
 use tactus_core::store::StoreError;
-use tactus_core::wire::{Command, Event, Failure, Identify, Train};
+use tactus_core::wire::{Command, Event, Identify, Train};
 
 use self::naming::Naming;
 use super::collection::Collection;
@@ -30,6 +30,7 @@ use super::probe::{Host, SimProbe, switch_on};
 use super::rig::{FORCE_LIMIT_N, SimError, SimRig};
 use tactus_world::faults::Fault;
 use tactus_world::mount::Mount;
+use tactus_world::world::Truth;
 
 /// Number of tries to home for a rig that is repaired.
 pub const HOMINGS: usize = 3;
@@ -38,7 +39,7 @@ pub const SHARE: f32 = 0.03;
 /// Largest force on a lifted finger, N.
 pub const LIFTED_N: f64 = 0.02;
 /// Largest speed of a stage that stands, mm/s.
-pub const STANDS_MM_S: f64 = 0.5;
+const STANDS_MM_S: f64 = 0.5;
 /// Largest way of a lever that stands, mm, in [`STILL_MS`].
 pub const STILL_MM: f64 = 0.01;
 /// See [`STILL_MM`].
@@ -48,11 +49,7 @@ pub const REST_S: u64 = 120;
 
 /// The world that the table of the firmware is learned from.
 pub fn world() -> Collection {
-    Collection {
-        seed: 1,
-        textures: (1..=117).collect(),
-        trials: 5,
-    }
+    Collection::new(1, (1..=117).collect(), 5)
 }
 
 /// The request to the probe.
@@ -182,47 +179,61 @@ pub struct Outcome {
     pub naming: Naming,
     /// Violated conditions.
     pub wrong: Vec<String>,
-    /// Virtual time.
-    pub took: Duration,
 }
 
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Case {
-            seed,
-            texture,
-            activity,
-            faults,
-            bits,
-            stiff,
-        } = &self.case;
-        let mount = if *stiff { " on a stiff mount" } else { "" };
-        write!(
-            f,
-            "seed {seed}: {activity:?} of T{texture}{mount}, {faults:?}, {} bits; {:.3} N, named {:?} ({}): {}",
-            bits.len(),
-            self.force_max_n,
-            self.named,
-            self.naming,
-            self.wrong.join("; ")
-        )
+        write!(f, "{self:?}")
     }
 }
 
-/// The probe's messages so far.
+impl Outcome {
+    /// What is wrong with a rig that has come to rest, by the world: its finger is lifted, unless a fault was named that
+    /// says how it is freed.
+    pub fn judge_rest(truth: &Truth, named: &[Named], wrong: &mut Vec<String>) {
+        if truth.speed_mm_s.abs() > STANDS_MM_S {
+            wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));
+        }
+        if truth.force_n > LIFTED_N && !named.iter().any(|named| frees_the_finger(*named)) {
+            wrong.push(format!("the finger is down, {:.3} N", truth.force_n));
+        }
+        if truth.force_max_n > FORCE_LIMIT_N {
+            wrong.push(format!("{:.3} N on the finger", truth.force_max_n));
+        }
+    }
+
+    /// What the store has lost: with each thing, whether it is as it was, or may be another one.
+    pub fn judge_kept(kept: [bool; 3], wrong: &mut Vec<String>) {
+        let what = ["table", "calibration", "share of false alarms"];
+        let lost = kept.into_iter().zip(what).filter(|(is_kept, _)| !is_kept);
+        wrong.extend(lost.map(|(_, what)| format!("the {what} has changed")));
+    }
+
+    /// The store after the power was off: another one than before only with a word, and only if its bits changed.
+    pub fn judge_store(case: &Case, same: bool, troubles: &[String], wrong: &mut Vec<String>) {
+        if !same && troubles.is_empty() {
+            wrong.push("another store after the power was off, without a word".into());
+        }
+        if case.bits.is_empty() && !(same && troubles.is_empty()) {
+            let troubles = troubles.join("; ");
+            wrong.push(format!("the store did not outlive its power: {troubles}"));
+        }
+    }
+}
+
 #[derive(Default)]
 struct HostLog {
     named: Vec<Named>,
     first_ns: Option<u64>,
     learned: bool,
-    troubles: Vec<Failure>,
+    troubles: Vec<String>,
 }
 
 impl Host for HostLog {
     fn tell(&mut self, event: Event) {
         match event {
             Event::TextureLearned(_) => self.learned = true,
-            Event::Trouble(why) => self.troubles.push(why),
+            Event::Trouble(why) => self.troubles.push(why.to_string()),
             _ => {}
         }
     }
@@ -307,11 +318,14 @@ impl<'t> Bench<'t> {
         let force_max_n = rest(&mut probe, &host, &mut wrong);
         let after = Kept::of(&mut probe);
         let learns = matches!(case.activity, Activity::Train | Activity::Label);
-        let may = (
-            learns && (asked.is_ok() || host.borrow().learned),
-            case.activity == Activity::Calibrate && asked.is_ok(),
-        );
-        wrong.extend(after.lost(&before, may));
+        let learned = learns && (asked.is_ok() || host.borrow().learned);
+        let measured = case.activity == Activity::Calibrate && asked.is_ok();
+        let kept = [
+            learned || after.table == before.table,
+            measured || after.calibration == before.calibration,
+            after.false_alarm == before.false_alarm,
+        ];
+        Outcome::judge_kept(kept, &mut wrong);
         let named = host.borrow().named.clone();
         let breaks_ns = case.faults.iter().map(|(ms, _)| began_ns + ms * 1_000_000);
         if let (Some(first_ns), breaks_ns) = (host.borrow().first_ns, breaks_ns.min())
@@ -322,7 +336,7 @@ impl<'t> Bench<'t> {
         let broke = case.faults.iter().map(|(_, fault)| fault);
         let naming = naming::judge(broke, &named, asked.is_err());
         let mut probe = self.restarted(probe, case, &host, &after, &mut wrong)?;
-        repaired(&mut probe, case, may.1, &mut wrong);
+        repaired(&mut probe, case, measured, &mut wrong);
         Ok(Outcome {
             case: case.clone(),
             force_max_n,
@@ -330,7 +344,6 @@ impl<'t> Bench<'t> {
             named,
             naming,
             wrong,
-            took: probe.rig.servo.rig().now(),
         })
     }
 
@@ -349,13 +362,7 @@ impl<'t> Bench<'t> {
         host.borrow_mut().troubles.clear();
         let mut probe = super::probe::switch_off_changed_and_on(probe, &case.bits)?;
         let after = Kept::of(&mut probe);
-        let troubles = &host.borrow().troubles;
-        if after != *before && troubles.is_empty() {
-            wrong.push("another store after the power was off, without a word".into());
-        }
-        if case.bits.is_empty() && (after != *before || !troubles.is_empty()) {
-            wrong.push(format!("the store did not outlive its power: {troubles:?}"));
-        }
+        Outcome::judge_store(case, after == *before, &host.borrow().troubles, wrong);
         Ok(probe)
     }
 }
@@ -380,25 +387,6 @@ impl Kept {
             calibration,
             false_alarm,
         }
-    }
-
-    /// The differences from before, except for those that the request may make: the table, the calibration.
-    fn lost(&self, before: &Self, (table, calibration): (bool, bool)) -> Vec<String> {
-        [
-            (!table && self.table != before.table, "table"),
-            (
-                !calibration && self.calibration != before.calibration,
-                "calibration",
-            ),
-            (
-                self.false_alarm != before.false_alarm,
-                "share of false alarms",
-            ),
-        ]
-        .into_iter()
-        .filter(|(is_lost, _)| *is_lost)
-        .map(|(_, what)| format!("the {what} has changed"))
-        .collect()
     }
 }
 
@@ -447,16 +435,7 @@ fn rest(
         wrong.push("a motor is still driven".into());
     }
     let truth = rig.world().truth();
-    if truth.speed_mm_s.abs() > STANDS_MM_S {
-        wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));
-    }
-    let named = &host.borrow().named;
-    if truth.force_n > LIFTED_N && !named.iter().any(|named| frees_the_finger(*named)) {
-        wrong.push(format!("the finger is down, {:.3} N", truth.force_n));
-    }
-    if truth.force_max_n > FORCE_LIMIT_N {
-        wrong.push(format!("{:.3} N on the finger", truth.force_max_n));
-    }
+    Outcome::judge_rest(&truth, &host.borrow().named, wrong);
     truth.force_max_n
 }
 

@@ -9,8 +9,8 @@ use tactus_core::features::Observation;
 use tactus_core::handheld::guidance::{Again, Event};
 use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
+use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
-use tactus_core::sensor::{FingerCode, FingerName};
 
 use crate::eval::learn::{self, TableError};
 use crate::sim::collection::{Collection, texture_name};
@@ -211,8 +211,7 @@ pub fn slides(
 
 /// Learns a handheld's table from a simulated hand: `collection.trials` slides of every texture. Returns also the
 /// numbers of textures without enough good slides; they are not in the table.
-pub fn learn_with(
-    finger: FingerName,
+pub fn learn(
     collection: &Collection,
     done: impl Fn() + Sync,
 ) -> Result<(Vec<u8>, Vec<u8>), TableError> {
@@ -220,7 +219,7 @@ pub fn learn_with(
         .textures
         .par_iter()
         .map(|&texture| {
-            let setup = collection.setup_with(finger, texture, 0);
+            let setup = collection.setup(texture, 0);
             let made = slides(setup, Manner::default(), collection.trials);
             done();
             made
@@ -242,7 +241,7 @@ pub fn learn_with(
         }
     }
     let table = learn::learn(Method::Fused, Some(FEATURES), &names, &[MOVEMENT], &known)?;
-    let table = learn::name_finger(&table, FingerCode::of(finger), 0, "")?;
+    let table = learn::name_finger(&table, FingerCode::of(collection.finger), 0, "")?;
     Ok((table, left_out))
 }
 
@@ -252,11 +251,7 @@ mod tests {
     use crate::sim::collection::texture_number;
 
     fn world(among: u8) -> Collection {
-        Collection {
-            seed: 1,
-            textures: Collection::spread(60, among),
-            trials: 5,
-        }
+        Collection::new(1, Collection::spread(60, among), 5)
     }
 
     /// A hand that holds its pace, and the probe at the height that its sensor of motion is for.
@@ -286,11 +281,7 @@ mod tests {
         let glass = texture_number("frosted glass").unwrap();
         let burlap = texture_number("burlap").unwrap();
         (1..=20).into_par_iter().for_each(|seed| {
-            let world = Collection {
-                seed,
-                textures: vec![burlap, glass],
-                trials: 1,
-            };
+            let world = Collection::new(seed, vec![burlap, glass], 1);
             let pace = |texture| {
                 let (good, _) = slides(world.setup(texture, seed), LEVEL, 1).unwrap();
                 good.first().unwrap().pace

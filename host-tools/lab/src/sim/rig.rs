@@ -64,7 +64,6 @@ pub enum SimError {
 pub struct SimRig {
     world: World,
     reader: Reader,
-    /// the finger's parts have started
     started: bool,
     control: Control,
     random: ChaCha8Rng,

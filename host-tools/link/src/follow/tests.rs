@@ -89,11 +89,7 @@ fn explored() -> &'static (Vec<u8>, Vec<Event>) {
 }
 
 fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
-    let world = Collection {
-        seed: 5,
-        textures: vec![10, UNKNOWN, 100],
-        trials: 3,
-    };
+    let world = Collection::new(5, vec![10, UNKNOWN, 100], 3);
     let calibration = calibrated(world.setup(10, 0)).unwrap();
     let bytes = world.learn(method, calibration, || ()).unwrap();
     let table = Table::read(&bytes).unwrap();

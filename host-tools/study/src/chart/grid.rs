@@ -12,7 +12,6 @@ pub(crate) struct Tile {
     /// Opacity of its colour, 0 to 1.
     pub(crate) shade: f64,
     pub(crate) colour: RGBColor,
-    /// With a thick frame.
     pub(crate) framed: bool,
     /// Tooltip; empty for none.
     pub(crate) says: String,
@@ -21,7 +20,6 @@ pub(crate) struct Tile {
 pub(crate) struct Grid<'a> {
     pub(crate) id: String,
     pub(crate) title: String,
-    /// Its description, for those who cannot see it.
     pub(crate) about: &'a str,
     /// Quantity of the columns, and the name of each.
     pub(crate) x: (&'a str, Vec<String>),
@@ -38,10 +36,6 @@ const LINE: i32 = 18;
 const TALL: i32 = 270;
 
 impl Grid<'_> {
-    /// Draws it.
-    ///
-    /// # Errors
-    /// See [`DrawError`].
     pub(crate) fn figure(self) -> Result<Figure, DrawError> {
         let (columns, rows) = (&self.x.1, &self.y.1);
         let longest = |names: &[String]| names.iter().map(|n| width(n, EM)).max().unwrap_or(0);

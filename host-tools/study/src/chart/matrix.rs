@@ -10,9 +10,6 @@ pub(crate) const SHADES: [f32; 5] = [0.05, 0.2, 0.4, 0.6, 0.8];
 
 /// A symmetric matrix of degrees from 0 to 1 as an image, `title` above it: black is 1. `told` is for those who cannot
 /// see it.
-///
-/// # Errors
-/// See [`DrawError`].
 pub(crate) fn matrix(
     id: impl Into<String>,
     title: &str,

@@ -118,7 +118,6 @@ pub(super) fn figure(
 }
 
 impl Figure {
-    /// Draws more over it.
     pub(super) fn add(&mut self, drawing: &str) {
         if let Some(end) = self.svg.rfind("</svg>") {
             self.svg.insert_str(end, drawing);
@@ -137,9 +136,7 @@ pub fn escaped(text: &str) -> String {
 /// Place of the words of [`write`] from their point.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum From {
-    /// They begin there.
     Left,
-    /// They end there.
     Right,
     /// They are about it.
     Middle,

@@ -9,10 +9,8 @@ use rustfft::{Fft, FftPlanner};
 pub(super) const TAXELS: usize = 16;
 /// Bins of the eight bands, half-open, in the spectrum of 256 samples.
 pub const BAND_EDGES: [usize; 9] = [2, 3, 5, 8, 13, 21, 34, 55, 90];
-/// Bytes in a row.
 pub(super) const ROW_BYTES: usize = 2 * TAXELS;
 
-/// Samples in a frame.
 const FRAME: usize = 256;
 /// Samples from one frame to the next.
 const HOP: usize = 128;
@@ -48,10 +46,7 @@ impl Default for Meter {
 }
 
 impl Meter {
-    /// Measures a slide: rows of 16 little-endian 16-bit values.
-    ///
-    /// # Errors
-    /// The slide is too short, or no taxel moves.
+    /// Measures a slide: rows of 16 little-endian 16-bit values. Errors: The slide is too short, or no taxel moves.
     pub(super) fn measure(&self, rows: &[u8]) -> Result<Measured, &'static str> {
         let samples = rows.len() / ROW_BYTES;
         if samples < SHORTEST {

@@ -7,9 +7,6 @@ use tactus_lab::eval::gauge::{Reading, Study, distinct};
 const TALL: u32 = 320;
 
 /// The chart of one property, with the `study` of its `readings`; `unit` follows the name of the axis.
-///
-/// # Errors
-/// See [`DrawError`].
 pub fn figure(
     id: &str,
     title: &str,

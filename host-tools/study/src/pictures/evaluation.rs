@@ -11,9 +11,6 @@ use tactus_lab::eval::reliability::verdicts;
 const FEW: usize = 12;
 
 /// Verdicts of these explorations at this threshold, row by row: presented textures, and columns of verdicts.
-///
-/// # Errors
-/// See [`DrawError`].
 pub fn confusion(
     courses: &[Course],
     names: &[String],

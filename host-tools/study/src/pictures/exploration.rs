@@ -10,7 +10,6 @@ use crate::chart::{Chart, DrawError, Figure, MARKS, Series};
 
 /// Textures that were never more probable than this have no line of their own.
 const LIKELY: f32 = 0.05;
-/// Most lines.
 const MOST: usize = 6;
 
 struct Counted {
@@ -63,9 +62,6 @@ impl<'t> Exploration<'t> {
     }
 
     /// Its picture; none, if no slide counted.
-    ///
-    /// # Errors
-    /// See [`DrawError`].
     pub fn figures(&self, threshold: f32) -> Result<Vec<Figure>, DrawError> {
         match self.slides.is_empty() {
             true => Ok(Vec::new()),

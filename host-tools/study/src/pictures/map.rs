@@ -9,9 +9,6 @@ use tactus_lab::eval::places::{Plane, distances, off};
 const NAMED: usize = 40;
 
 /// The map of a table's textures.
-///
-/// # Errors
-/// See [`DrawError`].
 pub fn figure(table: Table<'_>) -> Result<Figure, DrawError> {
     let distances = distances(table, None);
     let names: Vec<&str> = table.names().collect();

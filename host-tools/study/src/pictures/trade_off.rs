@@ -8,9 +8,6 @@ use tactus_lab::eval::verify::After;
 const TALL: u32 = 380;
 
 /// The curves after one slide, two, three.
-///
-/// # Errors
-/// See [`DrawError`].
 pub fn figure(after: &[After]) -> Result<Figure, DrawError> {
     let percent = |share: f64| 100.0 * share;
     let worst = after.iter().map(|a| percent(a.equal_error));

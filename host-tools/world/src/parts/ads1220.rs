@@ -156,7 +156,6 @@ impl Ads1220 {
         self.heard = false;
     }
 
-    /// A byte.
     pub(super) fn byte(&mut self, now_ns: u64, mosi: u8) -> u8 {
         if !self.heard {
             return FLOATING;

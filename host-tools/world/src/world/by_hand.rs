@@ -59,10 +59,8 @@ impl World {
         }
     }
 
-    /// Mounts another sample.
-    ///
-    /// # Errors
-    /// If the finger touches the one that is there or would touch the other, which may be thicker by millimetres.
+    /// Mounts another sample. Errors: the finger touches the one that is there or would touch the other, which may be
+    /// thicker by millimetres.
     pub fn place(&mut self, texture: u8) -> Result<(), NotLifted> {
         let surface = sample(texture, self.setup.world_seed, self.variation);
         self.must_be_over(&self.surface)?;
@@ -88,10 +86,7 @@ impl World {
         self.finger.played()
     }
 
-    /// Gives the finger a skin that is worn: 0 is new, at 1 its ridges are gone.
-    ///
-    /// # Errors
-    /// If the finger touches the sample.
+    /// Gives the finger a skin that is worn: 0 is new, at 1 its ridges are gone. Errors: the finger touches the sample.
     pub fn put_on_skin(&mut self, wear: f64) -> Result<(), NotLifted> {
         self.must_be_over(&self.surface)?;
         self.finger.put_on_skin(wear);

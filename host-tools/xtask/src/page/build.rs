@@ -20,7 +20,6 @@ const TRIALS: &str = "host-tools/lab/src/live/world-1.trials";
 /// The module is downloaded by whoever opens the page.
 const MOST_BYTES: usize = 1_500_000;
 
-/// What was built.
 pub(crate) struct Built {
     pub(crate) page: PathBuf,
     pub(crate) wasm: PathBuf,

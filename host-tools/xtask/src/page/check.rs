@@ -1,19 +1,16 @@
 //! The page's tests: in headless Chromium, and its module against the same code on this machine.
-use std::ffi::OsStr;
-use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, bail};
 
 use super::build::{CRATE, build};
+use crate::emulate;
 use crate::shell::{root, run, skip, target};
 use crate::toolchain::{self, BROWSER};
-use crate::{emulate, firmware};
 
 const WHAT: &str = "the page in a browser";
-const NOT_AS_IT_SHOULD_BE: &str = "the page is not as it should be";
 /// Longest that the probe in software takes: it may be compiled first.
 const STARTING: Duration = Duration::from_secs(600);
 /// Those that come with the command.
@@ -46,31 +43,11 @@ pub(crate) fn check() -> Result<()> {
     )?;
     let probe = Probe::in_software()?;
     let (page, wasm) = (&built.page, &built.wasm);
-    let arguments = [page, wasm, &native].map(|path| path.as_os_str());
-    let mut tests = in_browser(browser, &arguments, &probe.address);
-    run(&mut tests).context(NOT_AS_IT_SHOULD_BE)
-}
-
-/// Tries what the page does with a probe, with the emulated board in place of the one in software.
-pub(crate) fn emulated() -> Result<()> {
-    let browser = browser()?;
-    let built = build("release")?;
-    let probe = Probe::emulated()?;
-    let (page, wasm) = (&built.page, &built.wasm);
-    let arguments = [page, wasm, page].map(|path| path.as_os_str());
-    let mut tests = in_browser(browser, &arguments, &probe.address);
-    // one second of the board takes longer than a second
-    tests.env("TACTUS_PAGE_SLOW", "10");
-    tests.env("TACTUS_PAGE_ONLY", "a probe at a serial port");
-    run(&mut tests).context(NOT_AS_IT_SHOULD_BE)
-}
-
-fn in_browser(browser: &str, files: &[&OsStr], probe: &str) -> Command {
     println!("== node {CRATE}/tests/page.mjs");
     let mut tests = Command::new("node");
     tests.arg(root().join(CRATE).join("tests").join("page.mjs"));
-    tests.args(files).args([browser, probe]);
-    tests
+    tests.args([page, wasm, &native]);
+    run(tests.args([browser, &probe.address])).context("the page is not as it should be")
 }
 
 fn starts(program: &&str) -> bool {
@@ -81,7 +58,6 @@ fn starts(program: &&str) -> bool {
     ask.status().is_ok_and(|status| status.success())
 }
 
-/// A Chromium of this machine.
 fn browser() -> Result<&'static str> {
     let browser = BROWSERS.into_iter().find(starts);
     browser.context("no Chromium (apt-get install chromium)")
@@ -129,34 +105,6 @@ impl Probe {
             std::thread::sleep(Duration::from_millis(50));
         }
         bail!("the probe in software does not start in {STARTING:?}")
-    }
-
-    /// The firmware on the emulated board.
-    fn emulated() -> Result<Self> {
-        run(&mut emulate::build())?;
-        let elf = firmware::compile(&[emulate::RIG])?.remove(0);
-        let mut serves = emulate::program("serve");
-        serves.args(["--port", "0", "--texture", "burlap", "--elf"]);
-        let mut child = serves.arg(elf).stdout(Stdio::piped()).spawn()?;
-        let said = child.stdout.take().context("the emulator says nothing")?;
-        let mut probe = Self {
-            child,
-            address: String::new(),
-        };
-        let mut lines = BufReader::new(said).lines();
-        for line in lines.by_ref().map_while(Result::ok) {
-            if let Some((_, at)) = line.split_once("serial port at ") {
-                probe.address = at.split(',').next().unwrap_or(at).trim().to_owned();
-                break;
-            }
-        }
-        ensure!(
-            !probe.address.is_empty(),
-            "the emulated board does not start"
-        );
-        // it never waits for somebody who reads
-        std::thread::spawn(move || lines.for_each(drop));
-        Ok(probe)
     }
 }
 

@@ -19,7 +19,6 @@ const SWSTART: u32 = 1 << 30;
 /// Bits of a stream's CR (RM0090 10.5.5).
 const EN: u32 = 1;
 const CIRC: u32 = 1 << 8;
-/// Streams of a controller.
 const STREAMS: usize = 8;
 
 /// The converters and when each was switched on, ns.

@@ -23,7 +23,6 @@ pub(crate) struct Word {
     pub(crate) writes: bool,
     /// Bits that are in some field.
     pub(crate) fields: u32,
-    /// After a reset.
     pub(crate) reset: u32,
 }
 
@@ -37,7 +36,6 @@ impl Word {
 /// The place of a field: its word, and its bits.
 pub(crate) type Place = (u64, u32);
 
-/// All registers, by address.
 #[derive(Debug)]
 pub(crate) struct Vendor {
     words: FxHashMap<u64, Word>,
@@ -73,7 +71,6 @@ fn ones(bits: u32, at: u32) -> u32 {
     ((1_u64 << bits.min(32)) - 1).checked_shl(at).unwrap_or(0) as u32
 }
 
-/// The bits of a field, all of an array's.
 fn bits(field: &Field) -> u32 {
     let each = match &field.bit_offset {
         BitOffset::Regular(at) => ones(field.bit_size, at.offset),

@@ -3,14 +3,13 @@
 
 use std::path::Path;
 
+use anyhow::anyhow;
 use tactus_core::dsp::Plan;
 use tactus_world::world::Setup;
 
-use super::error::BenchError;
 use super::workload::{self, Counter, Workload};
 use crate::board::{Emulator, Options};
 
-/// What the chip found.
 pub(super) struct Counted {
     pub(super) instructions: u64,
     pub(super) equal: bool,
@@ -46,16 +45,12 @@ impl Counter for Uncounted {
     }
 }
 
-fn unsuitable(workload: Workload, what: &'static str) -> BenchError {
-    BenchError::Unsuitable {
-        kernel: format!("{workload:?}"),
-        what,
-    }
+fn unsuitable(workload: Workload, what: &str) -> anyhow::Error {
+    anyhow!("{workload:?}: {what}")
 }
 
 impl Bench {
-    /// Boots the silicon image as bench.
-    pub(super) fn start(elf: &Path) -> Result<Self, BenchError> {
+    pub(super) fn start(elf: &Path) -> anyhow::Result<Self> {
         let mut emulator = Emulator::start(elf, Setup::default(), Options::default())?;
         let (wanted, _) = emulator.symbol("BENCH_WANTED")?;
         emulator.write(wanted, &WANTED.to_le_bytes())?;
@@ -72,13 +67,12 @@ impl Bench {
         Ok(bench)
     }
 
-    fn word(&mut self, offset: u64) -> Result<u32, BenchError> {
+    fn word(&mut self, offset: u64) -> anyhow::Result<u32> {
         let bytes = self.emulator.read(self.desk + offset, 4)?;
         Ok(u32::from_le_bytes(bytes.try_into().unwrap_or_default()))
     }
 
-    /// Lets the chip begin with a workload.
-    fn begin(&mut self, workload: Workload, table: &[u8], words: &[i16]) -> Result<(), BenchError> {
+    fn begin(&mut self, workload: Workload, table: &[u8], words: &[i16]) -> anyhow::Result<()> {
         if 2 * words.len() as u64 > INPUT_BYTES {
             return Err(unsuitable(
                 workload,
@@ -98,7 +92,7 @@ impl Bench {
     }
 
     /// Runs the chip for so long; whether it is done with the workload.
-    fn step(&mut self, workload: Workload, ns: u64) -> Result<bool, BenchError> {
+    fn step(&mut self, workload: Workload, ns: u64) -> anyhow::Result<bool> {
         self.emulator.run_until(self.emulator.now_ns() + ns)?;
         match self.word(STATE)? {
             CHIPS_TURN => Ok(false),
@@ -113,7 +107,7 @@ impl Bench {
         workload: Workload,
         table: &[u8],
         words: &[i16],
-    ) -> Result<(u64, Vec<u8>), BenchError> {
+    ) -> anyhow::Result<(u64, Vec<u8>)> {
         self.begin(workload, table, words)?;
         let until = self.emulator.now_ns() + PATIENCE_NS;
         while !self.step(workload, 200_000)? {
@@ -138,7 +132,7 @@ impl Bench {
         workload: Workload,
         table: &[u8],
         words: &[i16],
-    ) -> Result<Counted, BenchError> {
+    ) -> anyhow::Result<Counted> {
         let (instructions, results) = self.send(workload, table, words)?;
         let mut expected = Vec::new();
         let mut put = |bytes: &[u8]| expected.extend_from_slice(bytes);

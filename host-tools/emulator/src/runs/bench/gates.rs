@@ -14,7 +14,6 @@ pub(crate) const GATES: &[(&str, &str, f64)] = &[
     ("last sample to the verdict on the link", "ms", 10.0),
 ];
 
-/// The gate of a kernel.
 pub(super) fn gate(kernel: &str) -> Option<f64> {
     let of = |(name, _, gate): &(&str, _, f64)| (*name == kernel).then_some(*gate);
     GATES.iter().find_map(of)

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, ensure};
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -14,24 +15,21 @@ use tactus_lab::data::recording::PAC_RATE_HZ;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::eval::learn;
 
+use super::DIFFERENT;
 use super::counter::Bench;
-use super::error::BenchError;
 use super::workload::{ObservedSlide, Workload};
 
 /// Samples of a slide of 3 s.
 pub(super) const SLIDE: usize = 6600;
 /// Textures of the tables that the gates are of: as many as the paper has.
 const OF_GATES: usize = 117;
+/// Textures that are still likely before a decision.
+const LIVE: usize = 50;
 /// Less probable textures are left out of a choice: the core's own limit.
 const NEGLIGIBLE: f32 = 1e-6;
 
-fn unsuitable(kernel: &str, what: &'static str) -> BenchError {
-    let kernel = kernel.to_owned();
-    BenchError::Unsuitable { kernel, what }
-}
-
 /// 3 s of a slide of a real finger, or of a synthetic one where there are no recordings; and which.
-pub(super) fn slide() -> Result<(Vec<i16>, &'static str), BenchError> {
+pub(super) fn slide() -> anyhow::Result<(Vec<i16>, &'static str)> {
     let root = std::env::var_os("TACTUS_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
         PathBuf::from,
@@ -43,8 +41,8 @@ pub(super) fn slide() -> Result<(Vec<i16>, &'static str), BenchError> {
             let steady = slide.steady(PAC_RATE_HZ).start;
             Some(slide.pac().get(steady..steady + SLIDE)?.to_vec())
         });
-        let too_short = || unsuitable("a slide", "the first recorded material has none of 3 s");
-        return Ok((samples.ok_or_else(too_short)?, "a real finger's"));
+        let too_short = "the first recorded material has no slide of 3 s";
+        return Ok((samples.context(too_short)?, "a real finger's"));
     }
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let samples = (0..SLIDE).map(|n| {
@@ -60,10 +58,12 @@ const MOVEMENTS: [Movement; 3] = [
     Movement::FOR_ROUGHNESS,
 ];
 
-/// A table of so many textures, neighbours hard to tell apart, each learned from 5 slides of 3 movements.
-fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
+/// The table that decisions are counted with, its neighbours hard to tell apart, each learned from 5 slides of 3
+/// movements: of made-up numbers, and not of the simulated world as the factory table is, so that a figure tells of the
+/// code.
+pub(super) fn of_gates(method: Method) -> anyhow::Result<Vec<u8>> {
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    let names: Vec<String> = (1..=textures).map(|t| format!("texture {t}")).collect();
+    let names: Vec<String> = (1..=OF_GATES).map(|t| format!("texture {t}")).collect();
     let slides: Vec<Vec<Vec<Observation>>> = names
         .iter()
         .map(|_| {
@@ -90,14 +90,8 @@ fn synthetic(method: Method, textures: usize) -> Result<Vec<u8>, BenchError> {
     Ok(learn::learn(method, None, &names, &MOVEMENTS, &slides)?)
 }
 
-/// The table that decisions are counted with: of made-up numbers, and not of the simulated world as the factory table
-/// is, so that a figure tells of the code.
-pub(super) fn of_gates(method: Method) -> Result<Vec<u8>, BenchError> {
-    synthetic(method, OF_GATES)
-}
-
 /// Compares signals that the figures below do not go through: any number of samples, beyond what 12 bits can differ by.
-pub(super) fn extremes(bench: &mut Bench) -> Result<(), BenchError> {
+pub(super) fn extremes(bench: &mut Bench) -> anyhow::Result<()> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     for samples in (1..20).map(|n| 31 * n).chain([264, 330, 1000]) {
         let reach = *[30.0, 4096.0, 32767.0].choose(&mut random).unwrap_or(&1.0);
@@ -106,28 +100,20 @@ pub(super) fn extremes(bench: &mut Bench) -> Result<(), BenchError> {
             .collect();
         let what = format!("samples: {samples}, reach: {reach}");
         let counted = bench.count(Workload::BandPower, &[], &words)?;
-        let different = || BenchError::Different(vec![what]);
-        counted.equal.then_some(()).ok_or_else(different)?;
+        ensure!(counted.equal, DIFFERENT.to_owned() + &what);
     }
     Ok(())
 }
 
-/// An observed slide, as words, and how many textures it leaves.
-pub(super) struct Wanted {
-    pub(super) words: Vec<i16>,
-    pub(super) live: usize,
-}
-
-/// A slide after which so many textures are still likely, or as nearly as can be found.
-pub(super) fn observed(table: &[u8], method: Method, live: usize) -> Result<Wanted, BenchError> {
-    let table = Table::read(table).map_err(|_| unsuitable("a decision", "the table is broken"))?;
-    let mut random = ChaCha8Rng::seed_from_u64(live as u64);
+/// A slide, as words, after which [`LIVE`] textures are still likely, or as nearly as can be found.
+pub(super) fn observed(table: &[u8], method: Method) -> anyhow::Result<Vec<i16>> {
+    let table = Table::read(table)?;
+    let mut random = ChaCha8Rng::seed_from_u64(LIVE as u64);
     let config = Config {
         method,
         ..Config::default()
     };
-    let mut explorer = Explorer::<2000>::new(table, PropertySet::ALL, config)
-        .map_err(|_| unsuitable("a decision", "the table cannot be explored"))?;
+    let mut explorer = Explorer::<2000>::new(table, PropertySet::ALL, config)?;
     let mut best: Option<(usize, ObservedSlide)> = None;
     for _ in 0..20_000 {
         let observed = match table.contents() {
@@ -143,18 +129,18 @@ pub(super) fn observed(table: &[u8], method: Method, live: usize) -> Result<Want
         let left = left.count();
         if best
             .as_ref()
-            .is_none_or(|(best, _)| left.abs_diff(live) < best.abs_diff(live))
+            .is_none_or(|(best, _)| left.abs_diff(LIVE) < best.abs_diff(LIVE))
         {
             best = Some((left, observed));
         }
-        if left == live {
+        if left == LIVE {
             break;
         }
     }
-    let (live, observed) = best.ok_or_else(|| unsuitable("a decision", "no slide suits"))?;
+    let (_, observed) = best.context("no slide suits a decision")?;
     let mut words = Vec::new();
     observed.write(|word| words.push(word));
-    Ok(Wanted { words, live })
+    Ok(words)
 }
 
 /// A slide of one of the textures, looked at by one property.

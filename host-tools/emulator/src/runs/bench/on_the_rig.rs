@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use anyhow::Context as _;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Event, Phase};
 use tactus_world::world::Setup;
 
-use super::error::BenchError;
 use super::gates::gate;
 use super::one_slide;
 use super::row::Row;
@@ -31,7 +31,7 @@ fn first_step_up(board: &mut Emulator, since_ns: u64) -> Option<u64> {
 }
 
 /// Measures load and latency of the rig's image while it makes a slide.
-pub(super) fn on_the_rig(elf: &Path, finger: FingerName) -> Result<Vec<Row>, BenchError> {
+pub(super) fn on_the_rig(elf: &Path, finger: FingerName) -> anyhow::Result<Vec<Row>> {
     let options = Options {
         trace_s: 2,
         ..Options::default()
@@ -79,12 +79,10 @@ pub(super) fn on_the_rig(elf: &Path, finger: FingerName) -> Result<Vec<Row>, Ben
         return Err(why.into());
     }
     let counted = talk.board().handlers()?;
-    let begun = begun.ok_or(BenchError::Rig("it says nothing of a slide"))?;
-    let over = over.ok_or(BenchError::Rig("the slide does not end"))?;
-    let (told_ns, _) = told.ok_or(BenchError::Rig("there is no verdict"))?;
-    let lifts_ns = lifts_ns.ok_or(BenchError::Rig(
-        "the finger is not lifted before the verdict",
-    ))?;
+    let begun = begun.context("the rig: it says nothing of a slide")?;
+    let over = over.context("the rig: the slide does not end")?;
+    let (told_ns, _) = told.context("the rig: there is no verdict")?;
+    let lifts_ns = lifts_ns.context("the rig: the finger is not lifted before the verdict")?;
     let slots = (talk.board().rig().sensor_commands() - commands) as f64;
     let seconds = (over.0 - begun.0) as f64 * 1e-9;
     let busy = (over.1 - begun.1) as f64 / (seconds * CORE_HZ);

@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-/// A kernel and what it is held against, all per unit.
 pub(super) struct Row {
     pub(super) kernel: String,
     pub(super) unit: &'static str,
@@ -31,7 +30,6 @@ impl Row {
     }
 }
 
-/// The table for people; `source` says whose slide it is.
 pub(super) fn print(rows: &[Row], source: &str) {
     let number = |number: Option<f64>| match number {
         None => "-".into(),

@@ -12,7 +12,6 @@ use super::one_slide;
 use crate::board::{Emulator, Options, Timing};
 use crate::host::talk::{Talk, TalkError};
 
-/// The core's clock.
 pub(crate) const CORE_HZ: f64 = 168e6;
 /// Cycles per instruction of the slots' interrupts in their worst millisecond, the most of all code, by the model of
 /// the core and its flash at commit 6025b56 (docs/src/performance.md).
@@ -27,9 +26,7 @@ const TIMEOUT_S: f64 = 120.0;
 /// An exploration by a core that is slower.
 #[derive(Clone, Debug)]
 pub struct Slowed {
-    /// When slots and servo came.
     pub(super) timing: Timing,
-    /// Virtual seconds that it took.
     pub(super) seconds: f64,
     counts: Counts,
     verdict: bool,
@@ -78,9 +75,6 @@ pub fn missed(slowed: &Result<Slowed, TalkError>) -> Vec<String> {
 }
 
 /// Homes and explores with the core's clock divided; all else keeps its time.
-///
-/// # Errors
-/// [`TalkError`].
 pub fn slowed(elf: &Path, by: f64) -> Result<Slowed, TalkError> {
     let hz = NonZeroU64::new((CORE_HZ / by) as u64);
     let options = Options {
@@ -108,7 +102,6 @@ pub fn slowed(elf: &Path, by: f64) -> Result<Slowed, TalkError> {
     })
 }
 
-/// Prints it for people.
 pub(super) fn print(slowed: &Result<Slowed, TalkError>) {
     println!(
         "\nA core that is {WORST_RATIO} x {RESERVE} times slower, {:.1} MHz with an instruction a cycle:",

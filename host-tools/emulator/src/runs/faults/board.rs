@@ -2,7 +2,6 @@
 //! link or the chip breaks. Judged by the world, by the pins and by what the flash holds.
 
 use std::path::Path;
-use std::time::Duration;
 
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
@@ -13,8 +12,7 @@ use tactus_core::sensor::biotac;
 use tactus_core::wire::{Command, Event, Identify, Phase, Report};
 use tactus_lab::sim::fault_case::naming;
 use tactus_lab::sim::fault_case::{
-    Activity, Case, HOMINGS, LIFTED_N, Outcome, SHARE, STANDS_MM_S, STILL_MM, STILL_MS,
-    frees_the_finger, world,
+    Activity, Case, HOMINGS, LIFTED_N, Outcome, SHARE, STILL_MM, STILL_MS, frees_the_finger, world,
 };
 use tactus_lab::sim::rig::FORCE_LIMIT_N;
 use tactus_link::Request;
@@ -161,27 +159,6 @@ impl Kept {
             false_alarm: status.false_alarm,
         })
     }
-
-    /// What is other than before, but for what was learned or measured. A table that has learned has one texture more.
-    fn lost(&self, before: &Self, learns: bool, measures: bool) -> Vec<String> {
-        let same_table = self.table == before.table && self.textures == before.textures;
-        let learned = learns && self.textures == before.textures + 1;
-        [
-            (same_table || learned, "table"),
-            (
-                measures || self.calibration == before.calibration,
-                "calibration",
-            ),
-            (
-                self.false_alarm == before.false_alarm,
-                "share of false alarms",
-            ),
-        ]
-        .into_iter()
-        .filter(|(is_kept, _)| !is_kept)
-        .map(|(_, what)| format!("the {what} has changed"))
-        .collect()
-    }
 }
 
 /// What is heard of the firmware, and what is done to it meanwhile.
@@ -286,10 +263,7 @@ impl<'e> BoardBench<'e> {
         Ok(Talk::new(emulator).look_every(LOOK_MS))
     }
 
-    /// Has a case happen.
-    ///
-    /// # Errors
-    /// The emulator, or a board that does not start before anything broke.
+    /// Has a case happen. Errors: The emulator, or a board that does not start before anything broke.
     pub fn run(&self, drawn: &BoardCase) -> Result<Outcome, TalkError> {
         let case = &drawn.case;
         let mut wrong = Vec::new();
@@ -347,7 +321,15 @@ impl<'e> BoardBench<'e> {
             _ => false,
         };
         let measured = case.activity == Activity::Calibrate && is_done;
-        wrong.extend(after.lost(&self.kept, learned, measured));
+        // a table that has learned has one texture more
+        let before = &self.kept;
+        let kept = [
+            (after.table, after.textures) == (before.table, before.textures)
+                || (learned && after.textures == before.textures + 1),
+            measured || after.calibration == before.calibration,
+            after.false_alarm == before.false_alarm,
+        ];
+        Outcome::judge_kept(kept, &mut wrong);
         let drifts = |(_, fault): &(u64, Fault)| matches!(fault, Fault::PdcDrift { .. });
         if case.faults.iter().any(drifts) {
             // a finger is exchanged with the power off: a P_DC that is right again at once is one that is pressed
@@ -365,7 +347,6 @@ impl<'e> BoardBench<'e> {
             named,
             naming,
             wrong,
-            took: Duration::from_nanos(talk.now_ns()),
         })
     }
 
@@ -396,18 +377,11 @@ impl<'e> BoardBench<'e> {
             listen_until(&mut talk, &mut ear, soon_ns)?;
             after = Kept::of(&mut talk, &mut ear)?;
         }
-        if after != *before && ear.troubles.is_empty() {
-            wrong.push("another store after the power was off, without a word".into());
-        }
-        if case.bits.is_empty() && (after != *before || !ear.troubles.is_empty()) {
-            let troubles = ear.troubles.join("; ");
-            wrong.push(format!("the store did not outlive its power: {troubles}"));
-        }
+        Outcome::judge_store(case, after == *before, &ear.troubles, wrong);
         Ok(())
     }
 }
 
-/// Runs the board to a time.
 fn listen_until(talk: &mut Talk, ear: &mut Ear, until_ns: u64) -> Result<(), TalkError> {
     while talk.now_ns() < until_ns {
         for report in talk.step()? {
@@ -489,16 +463,8 @@ fn rest(talk: &mut Talk, ear: &mut Ear, wrong: &mut Vec<String>) -> Result<(), T
         wrong.push("a motor is still driven".into());
     }
     let truth = talk.board().rig().world().truth();
-    if truth.speed_mm_s.abs() > STANDS_MM_S {
-        wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));
-    }
-    let mut named = ear.named.iter().map(|(_, named)| *named);
-    if truth.force_n > LIFTED_N && !named.any(frees_the_finger) {
-        wrong.push(format!("the finger is down, {:.3} N", truth.force_n));
-    }
-    if truth.force_max_n > FORCE_LIMIT_N {
-        wrong.push(format!("{:.3} N on the finger", truth.force_max_n));
-    }
+    let named: Vec<Named> = ear.named.iter().map(|(_, named)| *named).collect();
+    Outcome::judge_rest(&truth, &named, wrong);
     Ok(())
 }
 

@@ -16,13 +16,9 @@ fn factory_tables_are_of_this_world() {
         let Contents::Fused(set, features) = table.contents() else {
             panic!("{finger}: {:?}", table.contents());
         };
-        let collection = Collection {
-            seed: 1,
-            textures: (1..=117).step_by(58).collect(),
-            trials: 5,
-        };
-        let calibration = calibrated(collection.setup_with(finger, 1, 0)).unwrap();
-        let slides = collection.record_with(finger, calibration, || ());
+        let collection = Collection::new(1, (1..=117).step_by(58).collect(), 5).touched_by(finger);
+        let calibration = calibrated(collection.setup(1, 0)).unwrap();
+        let slides = collection.record(calibration, || ());
         let slides = slides.unwrap();
         for (slides, &texture) in slides.iter().zip(&collection.textures) {
             let movements = &Collection::MOVEMENTS;
@@ -52,11 +48,7 @@ fn factory_tables_are_of_this_world() {
 /// A press of the third trial was "force unsteady" in this world, and learning ended there.
 #[test]
 fn a_movement_that_failed_is_made_again() {
-    let world = Collection {
-        seed: 238,
-        textures: vec![111],
-        trials: 5,
-    };
+    let world = Collection::new(238, vec![111], 5);
     let setup = world.setup(111, 0);
     let calibration = calibrated(setup).unwrap();
     let movements = Collection::MOVEMENTS;

@@ -20,30 +20,27 @@ use tactus_world::world::Setup;
 /// The fingers that are no BioTac.
 const OTHERS: [FingerName; 2] = [FingerName::Analog, FingerName::Mems];
 
-fn world(textures: u8) -> Collection {
-    Collection {
-        seed: 11,
-        textures: Collection::spread(60, textures),
-        trials: 5,
-    }
+fn world(finger: FingerName, textures: u8) -> Collection {
+    Collection::new(11, Collection::spread(60, textures), 5).touched_by(finger)
 }
 
 #[test]
 fn eight_explorations_on_the_rig() {
     for finger in OTHERS {
-        let right = explore_on_the_rig(finger, &world(8));
+        let right = explore_on_the_rig(&world(finger, 8));
         assert!(right >= 7, "{finger}: {right} of 8");
     }
 }
 
 /// Explores each texture of a table once; the force of every slide is right, and how many textures are.
-fn explore_on_the_rig(finger: FingerName, world: &Collection) -> usize {
-    let calibration = calibrated(world.setup_with(finger, world.textures[0], 0)).unwrap();
+fn explore_on_the_rig(world: &Collection) -> usize {
+    let finger = world.finger;
+    let calibration = calibrated(world.setup(world.textures[0], 0)).unwrap();
     let bytes = world
-        .learn_with(
-            finger,
+        .learn_at(
             &Collection::MOVEMENTS,
             (Method::Fused, None),
+            &[],
             calibration,
             || (),
         )
@@ -59,7 +56,7 @@ fn explore_on_the_rig(finger: FingerName, world: &Collection) -> usize {
         .textures
         .par_iter()
         .map(|&unknown| {
-            let mut rig = SimRig::new(world.setup_with(finger, unknown, 100));
+            let mut rig = SimRig::new(world.setup(unknown, 100));
             rig.control().calibrate(calibration).unwrap();
             let mut explorer = Explorer::<128>::new(table, PropertySet::ALL, config).unwrap();
             let mut movements = Vec::new();
@@ -107,12 +104,12 @@ fn explore_on_the_rig(finger: FingerName, world: &Collection) -> usize {
 #[test]
 fn an_exploration_of_each_texture_by_hand() {
     for (finger, least) in FingerName::ALL.into_iter().zip([11, 9, 9]) {
-        let world = world(12);
-        let (bytes, left_out) = handheld::learn_with(finger, &world, || ()).unwrap();
+        let world = world(finger, 12);
+        let (bytes, left_out) = handheld::learn(&world, || ()).unwrap();
         assert_eq!(left_out, [0u8; 0], "{finger}");
         let table = Table::read(&bytes).unwrap();
         let is_right = |&&texture: &&u8| {
-            let setup = world.setup_with(finger, texture, 7);
+            let setup = world.setup(texture, 7);
             let (measured, _) =
                 handheld::slides(setup, Manner::default(), ASK_AFTER as u32).unwrap();
             let judged = (1..=ASK_AFTER)

@@ -2,16 +2,16 @@
 //! firmware stores once without a cut, and [`Emulator::store_writes`] has every word that it programs and every sector
 //! that it erases.
 //!
-//! [`Emulator::store_writes`]: crate::board::Emulator::store_writes
+//! [`Emulator::store_writes`]: tactus_emulator::board::Emulator::store_writes
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::board::{FlashWrite, places};
+use tactus_emulator::board::{FlashWrite, places};
 
 /// The torn state of a write.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Torn {
+pub(crate) enum Torn {
     /// It had not begun.
     Nothing,
     /// The lower half of the word; the sector's first part is erased.
@@ -24,18 +24,18 @@ pub enum Torn {
 
 impl Torn {
     /// All ways.
-    pub const ALL: [Self; 4] = [Self::Nothing, Self::Begin, Self::End, Self::Bits];
+    pub(crate) const ALL: [Self; 4] = [Self::Nothing, Self::Begin, Self::End, Self::Bits];
 }
 
 /// The power is off in this write of an operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cut {
+pub(crate) struct Cut {
     /// Writes before it.
-    pub at: usize,
+    pub(crate) at: usize,
     /// The torn state of that write.
-    pub torn: Torn,
+    pub(crate) torn: Torn,
     /// For the bits.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 fn word(store: &mut [u8], at: usize, change: impl FnOnce(u32) -> u32) {
@@ -94,7 +94,7 @@ fn tear(store: &mut [u8], write: FlashWrite, cut: Cut) {
 }
 
 /// The flash after some writes and a cut.
-pub fn left_by(before: &[u8], writes: &[FlashWrite], cut: Cut) -> Vec<u8> {
+pub(crate) fn left_by(before: &[u8], writes: &[FlashWrite], cut: Cut) -> Vec<u8> {
     let mut store = before.to_vec();
     for write in writes.iter().take(cut.at) {
         apply(&mut store, *write);

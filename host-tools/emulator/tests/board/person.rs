@@ -1,10 +1,10 @@
 //! A person who holds the emulated handheld and follows its display, while a host talks to it.
 
 use tactus_core::wire::{Event, Prompt, Report};
-use tactus_lab::sim::scenario::Step;
 use tactus_world::person::{Hand, Manner};
 
-use crate::board::{Display, Emulator};
+use tactus_emulator::board::{Display, Emulator};
+use tactus_emulator::host::hand::{HELD_S, LIFTED_S, REACTION_S, SLIDE_S};
 
 /// Texts of the display when it wants a press, and a slide.
 const PRESS: &str = "slide ";
@@ -42,58 +42,45 @@ enum At {
 
 /// A person who looks at the display.
 #[derive(Debug)]
-pub struct Person {
+pub(crate) struct Person {
     at: At,
-    force_n: f64,
     pace_mm_s: f64,
     /// The weight that is asked for, mN.
     weight: Option<u16>,
-    /// Slides made.
-    slides: u32,
     /// Time of the next look at the display, ns.
     looks_ns: u64,
 }
 
+/// Force that the person means to press with, N.
+const FORCE_N: f64 = 0.5;
 /// Interval between two looks, ns.
 const LOOK_NS: u64 = 20_000_000;
 
 impl Person {
     /// Puts the probe into a hand that means to slide so.
-    pub fn hold(board: &mut Emulator, seed: u64, manner: Manner) -> Self {
+    pub(crate) fn hold(board: &mut Emulator, seed: u64, manner: Manner) -> Self {
         board.rig().world().hold(Hand::new(seed, manner));
         Self {
             at: At::Idle,
-            force_n: 0.5,
             pace_mm_s: 25.0,
             weight: None,
-            slides: 0,
             looks_ns: 0,
         }
     }
 
-    /// Means to press this hard from now on.
-    pub fn press(&mut self, force_n: f64) {
-        self.force_n = force_n;
-    }
-
     /// Means to slide at this pace from now on.
-    pub fn slide_at(&mut self, pace_mm_s: f64) {
+    pub(crate) fn slide_at(&mut self, pace_mm_s: f64) {
         self.pace_mm_s = pace_mm_s;
     }
 
     /// Returns true if the hand is free: it neither presses nor is on its way.
-    pub fn is_idle(&self) -> bool {
+    pub(crate) fn is_idle(&self) -> bool {
         self.at == At::Idle
-    }
-
-    /// Slides made so far.
-    pub fn slides(&self) -> u32 {
-        self.slides
     }
 
     /// Takes a report of the probe to its host: the weight to put on the finger, if it is one that a person does not
     /// have at hand.
-    pub fn hear(&mut self, report: &Report) {
+    pub(crate) fn hear(&mut self, report: &Report) {
         if let Event::Prompt(prompt) = report.event {
             self.weight = match prompt {
                 Prompt::Weigh(mn) => Some(mn),
@@ -103,7 +90,7 @@ impl Person {
     }
 
     /// Looks at the display and continues: to be called every few ms, under any host.
-    pub fn look(&mut self, board: &mut Emulator) {
+    pub(crate) fn look(&mut self, board: &mut Emulator) {
         let now = board.now_ns();
         if now < self.looks_ns {
             return;
@@ -125,28 +112,20 @@ impl Person {
                 let mn = weight(shows).or(self.weight).unwrap_or(0);
                 (At::Weighing, Some((f64::from(mn) * 1e-3, 0.0)))
             }
-            At::Idle if shows(PRESS) && !shows(LIFT) => (At::Pressing, Some((self.force_n, 0.0))),
-            At::Pressing if shows(SLIDE) => {
-                (At::Reacting(after(Step::REACTION_MS as f64 * 1e-3)), None)
-            }
+            At::Idle if shows(PRESS) && !shows(LIFT) => (At::Pressing, Some((FORCE_N, 0.0))),
+            At::Pressing if shows(SLIDE) => (At::Reacting(after(REACTION_S)), None),
             At::Pressing if shows(LIFT) || !shows(PRESS) => {
-                (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
+                (At::Lifting(after(LIFTED_S)), Some((0.0, 0.0)))
             }
             At::Reacting(until) if now >= until => {
-                self.slides += 1;
-                (
-                    At::Sliding(after(Step::EXPLORED_S)),
-                    Some((self.force_n, self.pace_mm_s)),
-                )
+                (At::Sliding(after(SLIDE_S)), Some((FORCE_N, self.pace_mm_s)))
             }
             At::Sliding(until) if now >= until => {
-                (At::Holding(after(Step::HELD_S)), Some((self.force_n, 0.0)))
+                (At::Holding(after(HELD_S)), Some((FORCE_N, 0.0)))
             }
-            At::Holding(until) if now >= until => {
-                (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0)))
-            }
+            At::Holding(until) if now >= until => (At::Lifting(after(LIFTED_S)), Some((0.0, 0.0))),
             At::Lifting(until) if now >= until => (At::Idle, None),
-            At::Weighing if !shows(WEIGH) => (At::Lifting(after(Step::LIFTED_S)), Some((0.0, 0.0))),
+            At::Weighing if !shows(WEIGH) => (At::Lifting(after(LIFTED_S)), Some((0.0, 0.0))),
             at => (at, None),
         };
         self.at = at;
