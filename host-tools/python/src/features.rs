@@ -120,11 +120,13 @@ impl Features {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
         let measured = &self.measurement;
         let saved = Saved {
-            movement: self.movement,
+            movement: self.movement.into(),
             properties: measured.properties,
             roughness_is_bound: measured.roughness_is_bound,
             pdc: measured.pdc,
             pace: measured.pace,
+            bands: measured.bands,
+            clipped: measured.clipped,
             background: measured.background,
             spectrum: measured.spectrum.psd().to_vec(),
         };
@@ -195,19 +197,16 @@ fn features(
             blocks: Vec::new(),
             background,
             // a slide without it has none of its features
-            pdc: pdc.clone().unwrap_or_else(|| vec![0; pac.len()]),
-            pdc_rate_hz: match pdc {
-                Some(_) => pdc_rate_hz,
-                None => PAC_RATE_HZ,
-            },
+            pdc: pdc.unwrap_or_default(),
+            pdc_rate_hz,
             outside_mn: None,
             pace: None,
             shear_rate_hz,
+            highest_hz: None,
         };
         let cut = recording.cut(&still.unwrap_or_default(), &pac, shear.as_deref());
         let cut = cut.map_err(SlideError::new_err)?;
-        let mut measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
-        measurement.pdc = measurement.pdc.filter(|_| pdc.is_some());
+        let measurement = measure(plan(), &cut).map_err(|why| why.raise())?;
         Ok::<_, PyErr>(Features {
             movement,
             measurement,
@@ -218,11 +217,14 @@ fn features(
 /// All that [`Features`] holds, pickled.
 #[derive(Serialize, Deserialize)]
 struct Saved {
-    movement: Movement,
+    /// mN and um/s
+    movement: (u16, u32),
     properties: Properties,
     roughness_is_bound: bool,
     pdc: Option<(f32, f32)>,
     pace: Option<i16>,
+    bands: usize,
+    clipped: Option<tactus_core::features::SlideError>,
     background: f32,
     spectrum: Vec<f32>,
 }
@@ -234,12 +236,15 @@ fn _features(saved: &str) -> PyResult<Features> {
     let spectrum: Result<[f32; BINS], _> = saved.spectrum.try_into();
     let bins = |found: Vec<f32>| PyValueError::new_err(format!("{} bins, not {BINS}", found.len()));
     Ok(Features {
-        movement: saved.movement,
+        movement: Movement::stored(saved.movement.0, saved.movement.1)
+            .map_err(|why| why.raise())?,
         measurement: Measurement {
             properties: saved.properties,
             roughness_is_bound: saved.roughness_is_bound,
             pdc: saved.pdc,
             pace: saved.pace,
+            bands: saved.bands,
+            clipped: saved.clipped,
             background: saved.background,
             spectrum: Spectrum::from(spectrum.map_err(bins)?),
         },

@@ -1,6 +1,5 @@
 //! Folders of recordings, and the slides in them.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
