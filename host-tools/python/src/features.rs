@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
 use tactus_core::dsp::{BIN_HZ, BINS, Plan, Spectrum};
 use tactus_core::features::{Measurement, Movement, Observation, Properties, Property};
-use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
+use tactus_lab::data::recording::Recording;
 use tactus_lab::data::replay::{MeasuredSlide, measure};
 
 use crate::error::{Raise as _, SlideError};
