@@ -48,6 +48,7 @@ impl Slowed {
                 counts
                     == Counts {
                         slots: counts.slots,
+                        erasures: counts.erasures,
                         ..Counts::default()
                     },
                 format!("{counts:?}"),
