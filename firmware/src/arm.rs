@@ -10,6 +10,7 @@
 //! | thread mode | `orders` | what the arm is to do | reports to `send` |
 //! | thread mode | `receive`, `send` | frames of USART3 | requests to `probe`, the arm's words to `arm` |
 
+use embassy_stm32::gpio::{Input, Pull};
 use embassy_stm32::interrupt;
 
 use crate::boot::{Ends, ends, start};
@@ -37,6 +38,7 @@ pub fn arm() -> ! {
         let handle = ServoHandle {
             samples: samples_out,
             has_stage: false,
+            button: Input::new(r.handle.button, Pull::Down),
         };
         thread.spawn(only(probe::probe(r.store, r.go, handle, booted)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in, reset)));

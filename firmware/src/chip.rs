@@ -8,6 +8,7 @@ pub(crate) mod finger;
 pub(crate) mod flash;
 pub(crate) mod lever;
 pub(crate) mod motion;
+pub(crate) mod reading;
 pub(crate) mod rescue;
 mod select;
 mod slot_plan;

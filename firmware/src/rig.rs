@@ -12,6 +12,7 @@
 //! Their priorities, and between slots and servo those of the link's bytes and of the lever's steps (TIM1), are in
 //! `board`.
 
+use embassy_stm32::gpio::{Input, Pull};
 use embassy_stm32::interrupt;
 
 use crate::boot::{Ends, ends, start};
@@ -39,6 +40,7 @@ pub fn rig() -> ! {
         let handle = ServoHandle {
             samples: samples_out,
             has_stage: true,
+            button: Input::new(r.handle.button, Pull::Down),
         };
         thread.spawn(only(probe::probe(r.store, r.go, handle, booted)));
         thread.spawn(only(acquire::acquire(r.sensor, r.slots, words_in, reset)));

@@ -180,7 +180,7 @@ impl Bench {
             }
             Measure::Store => {
                 if let Some(pins) = self.storage.take() {
-                    self.store = Some(flash::open(pins).await);
+                    self.store = Some(flash::open(pins, None).await);
                 }
                 Saw::Store(self.rewritten().await)
             }

@@ -82,6 +82,7 @@ pub use encode::{
     Change, EncodeError, TextureStats, amend, encode, encode_fused, encoded_len, with_sections,
 };
 pub use finger::{FINGER_LENGTH, with_finger};
+pub(crate) use format::HEADER;
 pub use format::{
     Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, TableError, Tally, VERSION,
 };

@@ -485,8 +485,8 @@ fn assert_frames<M: Serialize + DeserializeOwned + PartialEq + Debug>(name: &str
 #[test]
 fn messages_have_the_golden_frames() {
     assert_frames::<Request>("requests.jsonl", 38);
-    assert_frames::<Report>("reports.jsonl", 84);
-    assert_frames::<Failure>("failures.jsonl", 142);
+    assert_frames::<Report>("reports.jsonl", 85);
+    assert_frames::<Failure>("failures.jsonl", 150);
 }
 
 /// The table of a log, and what follows on the request to identify.

@@ -5,12 +5,14 @@ use core::ptr::addr_of_mut;
 
 use embassy_time::{Duration, with_timeout};
 use static_cell::ConstStaticCell;
-use tactus_core::probe::seams::StoredBytes;
+use tactus_core::probe::Memory;
+use tactus_core::probe::seams::{Events, StoredBytes};
 use tactus_core::sensor::FingerCode;
 use tactus_core::store::{Store, StoreError};
 
 use super::bank2::Bank2;
 use super::finger;
+use super::reading::{self, Part};
 use super::store_place::{STORE_AT, STORE_LENGTH};
 use crate::board;
 
@@ -37,8 +39,31 @@ pub(crate) fn buffer() -> &'static mut [u8] {
     }
 }
 
-pub(crate) async fn open(flash: board::Storage) -> Result<Storage, StoreError> {
-    Store::open(Bank2::new(flash)).await
+/// Opens the store, without its settings where reading it has failed before the reset.
+pub(crate) async fn open(
+    flash: board::Storage,
+    failed: Option<Part>,
+) -> Result<Storage, StoreError> {
+    let bank = Bank2::new(flash);
+    reading::begin(Part::Store);
+    match failed {
+        Some(Part::Store) => Store::open_tables(bank).await,
+        _ => Store::open(bank).await,
+    }
+}
+
+/// Puts the table in force: the stored one, unless reading it has failed before the reset.
+pub(crate) async fn reload(
+    memory: &mut Memory<'_, Bank2, MappedTable>,
+    failed: Option<Part>,
+    events: &mut impl Events,
+) {
+    if failed == Some(Part::Table) {
+        memory.distrust();
+    }
+    reading::begin(Part::Table);
+    memory.reload(events).await;
+    reading::over();
 }
 
 /// Waits for a store that is being opened; `progress` is called at every look. An erase under way must not be dropped:
@@ -71,6 +96,9 @@ impl StoredBytes<Bank2> for MappedTable {
         finger::code()
     }
 
+    /// Board tests break it by its name.
+    #[unsafe(export_name = "tactus_stored_table")]
+    #[inline(never)]
     fn bytes(&mut self, store: &mut Storage) -> Option<&[u8]> {
         let table = store.table()?;
         let at = table.offset as usize;

@@ -6,6 +6,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
 use embassy_executor::InterruptExecutor;
+use embassy_stm32::gpio::Input;
 use embassy_stm32::interrupt;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -138,6 +139,7 @@ pub(crate) const BODY_ON_ARM: Body = Body {
 pub(crate) struct ServoHandle {
     pub(crate) samples: Consumer<'static, Samples>,
     pub(crate) has_stage: bool,
+    pub(crate) button: Input<'static>,
 }
 
 impl Servo for ServoHandle {
@@ -155,6 +157,10 @@ impl Servo for ServoHandle {
     async fn wait(&mut self) {
         let _ = with_timeout(Duration::from_millis(LOOK_MS.into()), ENDED.wait()).await;
         progress();
+    }
+
+    fn pressed(&self) -> Option<bool> {
+        Some(self.button.is_high())
     }
 
     fn state(&self) -> RigState {

@@ -31,6 +31,7 @@ use super::outbox::{self, STREAM};
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
 use crate::chip::motion::MotionBus;
+use crate::chip::reading;
 use crate::chip::slots::{self, Word};
 use crate::chip::watchdog;
 use crate::chip::{KERNELS, finger};
@@ -302,10 +303,11 @@ pub(crate) async fn hand(
     outbox::booted(reset, last_words);
     // textures of a simulated world under a simulated hand; the user trains a real probe
     let table = factory::handheld(finger::name());
-    let store = flash::wait(flash::open(flash), progress).await;
+    let failed = reading::failed(reset);
+    let store = flash::wait(flash::open(flash, failed), progress).await;
     let mut events = EventSink::new(go, true);
     let mut memory = Memory::new(store, MappedTable, table, flash::buffer());
-    memory.reload(&mut events).await;
+    flash::reload(&mut memory, failed, &mut events).await;
     let textures = memory.table().map_or(0, |table| table.textures());
     let mut handheld = Handheld::new(plan, textures);
     if let Some(why) = memory.trouble() {
@@ -342,6 +344,7 @@ pub(crate) async fn hand(
         if let Ok(request) = JOBS.try_receive() {
             STOPPED.store(false, Relaxed);
             BUSY.store(true, Relaxed);
+            probe.memory.at(Instant::now().as_millis() as u32);
             by_hand::serve(&mut probe, &request).await;
             BUSY.store(false, Relaxed);
         }

@@ -23,6 +23,7 @@ use crate::chip::{finger, slots};
 pub(crate) const CHUNK: usize = 256;
 
 static DAMAGED_FRAMES: AtomicU32 = AtomicU32::new(0);
+static ERASURES: AtomicU32 = AtomicU32::new(0);
 pub(crate) static JOBS: Channel<OneLevel, Request, 1> = Channel::new();
 pub(crate) static BUSY: AtomicBool = AtomicBool::new(false);
 /// Somebody has asked for something since the probe booted.
@@ -133,6 +134,7 @@ impl Panel for Body {
             lost_samples: slots::LOST.load(Relaxed) + (self.lost)(),
             lost_reports: outbox::LOST_REPORTS.load(Relaxed),
             damaged_frames: DAMAGED_FRAMES.load(Relaxed),
+            erasures: ERASURES.load(Relaxed),
         }
     }
 
@@ -179,6 +181,10 @@ impl Events for EventSink {
 
     fn table(&mut self, table: TableInUse) {
         TABLE.lock(|cell| cell.set(table));
+    }
+
+    fn erased(&mut self, sectors: u32) {
+        ERASURES.store(sectors, Relaxed);
     }
 
     fn go(&mut self, on: bool) {

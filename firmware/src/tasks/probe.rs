@@ -1,7 +1,7 @@
 //! What the host asks for, one thing after the other. Owns the store.
 use core::sync::atomic::Ordering::Relaxed;
 
-use embassy_time::Timer;
+use embassy_time::{Instant, Timer};
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 use tactus_core::probe::seams::{Events, RigHandle as _};
@@ -16,6 +16,7 @@ use super::link::{BUSY, EventSink, JOBS};
 use super::outbox;
 use crate::board;
 use crate::chip::flash::{self, MappedTable};
+use crate::chip::reading::{self, Part};
 use crate::chip::{KERNELS, finger};
 
 /// The sensor's first words are there so long after it was found.
@@ -48,9 +49,12 @@ pub(crate) async fn probe(
     Timer::after_millis(HEARD_MS).await;
     // An arm is told to stop, and asked for more once somebody asks for a slide: it may not be there.
     let lifted = !has_stage || rig.lift().await.is_ok();
+    let failed = reading::failed(reset);
     let opening = async {
-        let mut store = flash::open(flash).await?;
-        if let Err(why) = store.mend().await {
+        let mut store = flash::open(flash, failed).await?;
+        if failed != Some(Part::Store)
+            && let Err(why) = store.mend().await
+        {
             events.tell(Event::Trouble(why.into()));
         }
         Ok(store)
@@ -69,7 +73,7 @@ pub(crate) async fn probe(
         events,
         plan: PLAN.init_with(|| Plan::with(KERNELS)),
     };
-    probe.memory.reload(&mut probe.events).await;
+    flash::reload(&mut probe.memory, failed, &mut probe.events).await;
     // a lever that does not go up must not be asked again before somebody has looked at it
     if lifted && has_stage {
         let _ = probe.rig.home().await;
@@ -81,6 +85,7 @@ pub(crate) async fn probe(
         let request = JOBS.receive().await;
         drive::progress();
         BUSY.store(true, Relaxed);
+        probe.memory.at(Instant::now().as_millis() as u32);
         probe.serve(&request).await;
     }
 }

@@ -115,6 +115,13 @@ pub(crate) fn status_rows(
             ),
         ),
         (
+            "flash",
+            format!(
+                "{} erased since the start",
+                count(counts.erasures, "sector")
+            ),
+        ),
+        (
             "skin",
             format!("{joule:.1} J of sliding, {wear:.1} J of it wear"),
         ),
@@ -175,7 +182,10 @@ With high forces on, movements may press with up to 2 N, and the guard acts at 2
 on the finger's core, and P_DC no longer tells the force; where P_DC says too little, or the skin is torn, the lever
 presses on. What keeps the finger whole then is no program: a mount whose spring yields (preloaded to
 2.05 N, 0.009 N/mm), or a hard stop that the lever cannot push beyond 2.2 N. The usual mount, of 1.45 N, yields before
-2 N are reached.";
+2 N are reached.
+
+A rig on a board with a button allows it only when that is pressed (the blue one, within 30 s of your answer): a person
+is there then. Where there is no button, the link suffices: whoever has it may allow high forces.";
 /// The question to such a person.
 pub(crate) const YIELDS: &str = "Does the finger's mount yield, or does a stop hold the lever?";
 

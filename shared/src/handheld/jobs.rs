@@ -113,7 +113,9 @@ pub fn words(why: &MemoryError) -> &'static str {
         MemoryError::NoTable(_) | MemoryError::Table(_) => {
             "The textures cannot be read. Load them with a computer."
         }
-        MemoryError::StoredTable(_) => "Your textures are damaged. The built-in ones are in use.",
+        MemoryError::StoredTable(_) | MemoryError::Unread => {
+            "Your textures are damaged. The built-in ones are in use."
+        }
         MemoryError::NewestTable(_) => {
             "Your textures are damaged. Those before the last change are in use."
         }

@@ -38,6 +38,22 @@ pub const fn turn(command: &Command, busy: bool) -> Turn {
     }
 }
 
+/// Whether this may erase a sector of the flash as often as a host asks for it: what takes its time between, as a
+/// training, does not.
+const fn may_erase(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Label(_)
+            | Command::Rename { .. }
+            | Command::Forget(_)
+            | Command::WriteCalibration(_)
+            | Command::BeginTable(_)
+            | Command::FactoryTable
+            | Command::SetFalseAlarm(_)
+            | Command::SetHighForce(_)
+    )
+}
+
 /// Deals with a request that has just come: answers it, refuses it, or gives back that it is to be queued for
 /// [`Probe::perform`]. `busy`: a request is queued or being worked on.
 pub fn receive(request: &Request, busy: bool, panel: &mut impl Panel) -> Turn {
@@ -130,6 +146,15 @@ where
 
     /// Does what was asked for; an exploration has a result.
     pub async fn perform(&mut self, command: &Command) -> Result<Option<Identification>, Failure> {
+        if may_erase(command) {
+            self.memory.may_erase()?;
+        }
+        let done = self.do_it(command).await;
+        self.memory.count_erasures(&mut self.events);
+        done
+    }
+
+    async fn do_it(&mut self, command: &Command) -> Result<Option<Identification>, Failure> {
         match command {
             Command::Identify(wanted) => return self.identify(wanted, false).await.map(Some),
             Command::Verify(wanted) => return self.identify(wanted, true).await.map(Some),

@@ -13,6 +13,21 @@ use crate::wire::{Event, Failure, MemoryError};
 
 pub(super) type Lent<'a, F> = (&'a mut Store<F>, Table<'a>, &'a mut [u8]);
 
+/// Erasures since boot that need not wait, and the time that each one after them takes.
+const FREE_ERASURES: u32 = 10;
+const ERASURE_MS: u32 = 1000;
+
+/// The wear of the flash by requests of a host.
+#[derive(Default)]
+struct Wear {
+    /// The time of the request; unknown where no clock tells it, and then nothing is bounded.
+    now_ms: Option<u32>,
+    counted: u32,
+    /// When sectors were erased last, and how many.
+    erased_ms: u32,
+    erased: u32,
+}
+
 /// What a probe knows.
 pub struct Memory<'m, F, B> {
     /// Or why it could not be opened.
@@ -25,6 +40,9 @@ pub struct Memory<'m, F, B> {
     length: Result<usize, MemoryError>,
     is_factory: bool,
     instead: Option<MemoryError>,
+    /// Generation of a stored table that is not to be read: see [`Memory::distrust`].
+    distrusted: Option<u32>,
+    wear: Wear,
     /// Share of false alarms that limits are for; the table's own, unless set.
     pub false_alarm: Option<f32>,
     /// Summary of the last exploration, until the rig moves again.
@@ -37,8 +55,10 @@ fn base<'b, F: NorFlash, B: StoredBytes<F>>(
     store: &mut Result<Store<F>, StoreError>,
     stored: &'b mut B,
     factory: &'b [u8],
+    distrusted: Option<u32>,
 ) -> (&'b [u8], Option<TableError>) {
     let store = store.as_mut().ok();
+    let store = store.filter(|store| !is_distrusted(store, distrusted));
     let finger = stored.finger();
     match store.and_then(|store| stored.bytes(store)) {
         None => (factory, None),
@@ -48,6 +68,11 @@ fn base<'b, F: NorFlash, B: StoredBytes<F>>(
             Err(why) => (factory, Some(why)),
         },
     }
+}
+
+fn is_distrusted<F: NorFlash>(store: &Store<F>, distrusted: Option<u32>) -> bool {
+    let stored = store.table().map(|table| table.generation);
+    stored.is_some() && stored == distrusted
 }
 
 impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
@@ -66,6 +91,8 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             length: Ok(0),
             is_factory: true,
             instead: None,
+            distrusted: None,
+            wear: Wear::default(),
             false_alarm: None,
             episode: None,
         }
@@ -76,6 +103,53 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         (self.store, self.factory, self.buffer)
     }
 
+    /// Tells the time of the next request, in ms since boot: from the tenth erasure on, sectors are erased at most once
+    /// a second for a host, which could wear the flash out in less than an hour otherwise.
+    pub fn at(&mut self, now_ms: u32) {
+        self.wear.now_ms = Some(now_ms);
+    }
+
+    fn erasures(&self) -> u32 {
+        self.store.as_ref().map_or(0, Store::erasures)
+    }
+
+    /// Errors: so many sectors were erased that this request has to wait.
+    pub(super) fn may_erase(&self) -> Result<(), MemoryError> {
+        let erasures = self.erasures();
+        let Wear {
+            now_ms: Some(now_ms),
+            erased_ms,
+            erased,
+            ..
+        } = self.wear
+        else {
+            return Ok(());
+        };
+        let wait_ms = ERASURE_MS.saturating_mul(erased);
+        if erasures >= FREE_ERASURES && now_ms.wrapping_sub(erased_ms) < wait_ms {
+            return Err(StoreError::TooSoon(erasures).into());
+        }
+        Ok(())
+    }
+
+    /// Counts what the request has erased.
+    pub(super) fn count_erasures(&mut self, events: &mut impl Events) {
+        let erasures = self.erasures();
+        if erasures != self.wear.counted {
+            self.wear.erased = erasures.wrapping_sub(self.wear.counted);
+            self.wear.counted = erasures;
+            self.wear.erased_ms = self.wear.now_ms.unwrap_or(0);
+            events.erased(erasures);
+        }
+    }
+
+    /// Leaves the stored table unread, which reset the probe when it read it: the firmware's is in its place until
+    /// another table is stored.
+    pub fn distrust(&mut self) {
+        let stored = self.store.as_ref().ok().and_then(Store::table);
+        self.distrusted = stored.map(|table| table.generation);
+    }
+
     /// Puts the table in force, with the limits that are set, which `events` hears of.
     pub async fn reload(&mut self, events: &mut impl Events) {
         let damaged = self.store.as_ref().ok().and_then(Store::damaged_table);
@@ -84,14 +158,18 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
             self.false_alarm = store.false_alarm().await.unwrap_or(None);
         }
         let finger = self.stored.finger();
-        let (base, why) = base(&mut self.store, &mut self.stored, self.factory);
+        let is_unread = |store| is_distrusted(store, self.distrusted);
+        let is_unread = self.store.as_ref().is_ok_and(is_unread);
+        let distrusted = self.distrusted;
+        let (base, why) = base(&mut self.store, &mut self.stored, self.factory, distrusted);
         self.is_factory = core::ptr::eq(base, self.factory);
         let instead = if self.is_factory {
             MemoryError::StoredTable
         } else {
             MemoryError::NewestTable
         };
-        self.instead = why.or(damaged).map(instead);
+        let unread = is_unread.then_some(MemoryError::Unread);
+        self.instead = unread.or(why.or(damaged).map(instead));
         if let Some(why) = &self.instead {
             events.tell(Event::Trouble(why.clone().into()));
         }
@@ -146,7 +224,8 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
     /// What learning needs; [`Memory::reload`] is due after it.
     #[inline(never)]
     pub(super) fn lend(&mut self) -> Result<Lent<'_, F>, MemoryError> {
-        let (bytes, _) = base(&mut self.store, &mut self.stored, self.factory);
+        let distrusted = self.distrusted;
+        let (bytes, _) = base(&mut self.store, &mut self.stored, self.factory, distrusted);
         let base = Table::read(bytes).map_err(MemoryError::NoTable)?;
         let store = self
             .store

@@ -90,6 +90,9 @@ pub trait Events {
     /// This table is in force now.
     fn table(&mut self, table: TableInUse);
 
+    /// So many sectors of the store were erased since boot.
+    fn erased(&mut self, _sectors: u32) {}
+
     /// The go / no-go output: on from a verification that said "the same" until the next one begins.
     fn go(&mut self, _on: bool) {}
 }

@@ -169,6 +169,11 @@ pub trait Servo {
     /// Waits for the end of a slide, [`LOOK_MS`] at most.
     async fn wait(&mut self);
 
+    /// Whether the board's button is pressed; `None` on a board without one.
+    fn pressed(&self) -> Option<bool> {
+        None
+    }
+
     /// The state after the last tick.
     fn state(&self) -> RigState;
 
@@ -283,6 +288,27 @@ impl<S: Servo> ServoRig<S> {
 
     /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is
     /// done.
+    /// Waits until somebody presses the board's button and lets it go before that: high forces are not allowed over the
+    /// line alone, where the board has a button. Errors: nobody does, or the probe is told to stop.
+    async fn confirmed(&mut self) -> Result<(), Failure> {
+        let mut was_released = false;
+        for look in 0..30 * LOOKS_HZ {
+            match self.servo.pressed() {
+                None => return Ok(()),
+                Some(true) if was_released => return Ok(()),
+                Some(pressed) => was_released |= !pressed,
+            }
+            if self.servo.is_stopped() {
+                return Err(Failure::Rig(RigError::Stopped));
+            }
+            if look % LOOKS_HZ == 0 {
+                self.servo.tell(Event::Prompt(Prompt::Button));
+            }
+            self.servo.wait().await;
+        }
+        Err(Failure::NotPressed)
+    }
+
     async fn with_person(&mut self, mn: u16, asked: &mut PersonTask) -> Result<(), RigError> {
         if self.rest().await?.phase == Phase::Parked {
             self.home().await?;
@@ -407,7 +433,11 @@ impl<S: Servo> RigHandle for ServoRig<S> {
         allow: bool,
         store: Result<&mut Store<F>, MemoryError>,
     ) -> Result<(), Failure> {
-        let kept = store?.set_high_force(allow).await;
+        let store = store?;
+        if allow {
+            self.confirmed().await?;
+        }
+        let kept = store.set_high_force(allow).await;
         let command = RigCommand::AllowHighForce(allow && kept.is_ok());
         let done = self.servo.command(command).await;
         done.map_err(|why| Failure::Rig(RigError::Refused(why)))?;

@@ -1,5 +1,6 @@
 //! Explorations and trainings on a scripted rig.
 
+mod bounds;
 mod dispatch;
 
 use super::explore::Random;

@@ -61,6 +61,10 @@ pub enum StoreError {
     Calibration(RigCalibrationError),
     #[error("the flash does not answer: switch the probe off and on")]
     Silent,
+    #[error(
+        "{0} sectors of the flash were erased since the start, which wears it: ask again in a second"
+    )]
+    TooSoon(u32),
 }
 
 impl StoreError {

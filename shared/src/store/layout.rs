@@ -4,7 +4,7 @@ use embedded_storage_async::nor_flash::NorFlash;
 
 use super::correct::Checksum;
 use crate::CRC32;
-use crate::table::TableError;
+use crate::table::{self, TableError};
 
 pub(super) const WORD: usize = 4;
 /// Where the sectors of a store begin and end, in the smallest of them: two for small tables, two of the settings, two
@@ -51,10 +51,6 @@ pub(super) enum Slot {
 
 impl Slot {
     pub(super) const ALL: [Self; 4] = [Self::A, Self::B, Self::C, Self::D];
-    /// The two that take turns with tables which fit into the smallest sectors: those are erased the soonest.
-    pub(super) const SMALL: [Self; 2] = [Self::A, Self::B];
-    pub(super) const LARGE: [Self; 2] = [Self::C, Self::D];
-
     const fn place(self) -> (u32, u32) {
         match self {
             Self::A => (0, 1),
@@ -85,9 +81,11 @@ impl Slot {
 pub(super) struct Push {
     pub(super) slot: Slot,
     pub(super) length: usize,
-    /// Bytes taken; those of an unfinished word are in `word`.
+    /// Bytes taken; those of an unfinished word are in `word`, and all of them in `header` as long as they are less than
+    /// a header. Nothing is erased before that is a table's.
     pub(super) at: usize,
     pub(super) word: [u8; WORD],
+    pub(super) header: [u8; table::HEADER],
 }
 
 #[derive(Default)]
@@ -101,6 +99,8 @@ pub(super) struct Slots {
     /// Largest generation that any slot has had.
     pub(super) generation: u32,
     pub(super) push: Option<Push>,
+    /// Of [`Slot::ALL`], those that did not keep a table.
+    pub(super) worn: [bool; 4],
 }
 
 impl Slots {
@@ -115,13 +115,29 @@ impl Slots {
         }
     }
 
-    /// The slot for a table of this pair: of the two, the one whose loss matters less. The newest table is never lost.
-    pub(super) fn next(&mut self, [one, other]: [Slot; 2]) -> Slot {
-        if *self.usable(one) <= *self.usable(other) {
-            one
-        } else {
-            other
+    /// The slot has not kept a table: others are preferred until the next start.
+    pub(super) fn set_worn(&mut self, slot: Slot) {
+        for (worn, it) in self.worn.iter_mut().zip(Slot::ALL) {
+            *worn |= it == slot;
         }
+    }
+
+    /// The slot for a table of so many bytes: none of the newest two tables, the one in use and the one that is in its
+    /// place when that is damaged, unless both are large and the new one is; one of those that are erased the soonest,
+    /// where it fits into it; and the one whose loss matters least.
+    pub(super) fn next<F: NorFlash>(&mut self, length: usize) -> Slot {
+        let newest = self.usable.iter().max().copied().unwrap_or(0);
+        let others = self.usable.iter().filter(|other| **other != newest);
+        let second = others.max().copied().unwrap_or(0);
+        let state = self.usable.into_iter().zip(self.worn);
+        let of_each = Slot::ALL.into_iter().zip(state);
+        let fitting = of_each.filter(|(slot, _)| slot.capacity::<F>() >= length);
+        let loss = |(slot, (generation, worn)): &(Slot, (u32, bool))| {
+            let is_kept = *generation != 0 && *generation >= second;
+            let is_large = slot.capacity::<F>() > Slot::A.capacity::<F>();
+            (is_kept, *worn, is_large, *generation)
+        };
+        fitting.min_by_key(loss).map_or(Slot::D, |(slot, _)| slot)
     }
 }
 

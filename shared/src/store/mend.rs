@@ -99,7 +99,9 @@ impl<F: NorFlash> Store<F> {
     }
 
     async fn in_pages(&mut self, at: u32, bytes: &mut [u8]) -> Result<(), StoreError> {
-        let read = Pages(&mut self.flash).read(at, bytes).await;
+        let read = Pages(&mut self.flash, &mut self.erasures)
+            .read(at, bytes)
+            .await;
         read.map_err(StoreError::flash)
     }
 

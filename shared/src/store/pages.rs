@@ -29,7 +29,8 @@ pub(super) const fn page_size<F: NorFlash>() -> usize {
     F::ERASE_SIZE - TRAILER
 }
 
-pub(super) struct Pages<'f, F>(pub(super) &'f mut F);
+/// The flash, and how many sectors of it were erased.
+pub(super) struct Pages<'f, F>(pub(super) &'f mut F, pub(super) &'f mut u32);
 
 #[derive(Clone, Copy)]
 enum Word {
@@ -72,6 +73,7 @@ impl<F: NorFlash> Pages<'_, F> {
 
     async fn erase_sector(&mut self, page: u32) -> Result<(), F::Error> {
         let start = Self::sector(page);
+        *self.1 = self.1.saturating_add(1);
         self.0.erase(start, start + F::ERASE_SIZE as u32).await
     }
 

@@ -20,6 +20,7 @@ pub struct Store<F> {
     pub(super) lost: Option<u8>,
     /// A write to the settings has not ended well: what it left may have to be sealed.
     pub(super) is_unsure: bool,
+    pub(super) erasures: u32,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -35,6 +36,13 @@ impl<F: NorFlash> Store<F> {
     ///
     /// Settings that cannot be read are no error here, see [`Store::settings`]: tables can be used without them.
     pub async fn open(flash: F) -> Result<Self, StoreError> {
+        let mut store = Self::open_tables(flash).await?;
+        store.open_settings().await?;
+        Ok(store)
+    }
+
+    /// Opens the tables only: the settings are taken for damaged, and not looked at.
+    pub async fn open_tables(flash: F) -> Result<Self, StoreError> {
         let () = Self::CHECK;
         let mut store = Self {
             flash,
@@ -42,13 +50,18 @@ impl<F: NorFlash> Store<F> {
             settings: Err(SettingsError::Corrupt),
             lost: None,
             is_unsure: false,
+            erasures: 0,
         };
         if store.flash.capacity() < UNITS * F::ERASE_SIZE {
             return Err(StoreError::NoSpace(store.flash.capacity()));
         }
         store.find_tables(|_| ()).await?;
-        store.open_settings().await?;
         Ok(store)
+    }
+
+    /// Sectors that were erased since it was opened.
+    pub fn erasures(&self) -> u32 {
+        self.erasures
     }
 
     /// Gives the flash back.
@@ -62,6 +75,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     pub(super) async fn erase(&mut self, from: u32, to: u32) -> Result<(), StoreError> {
+        self.erasures = self.erasures.saturating_add(1);
         let done = self.flash.erase(from, to).await;
         done.map_err(StoreError::flash)
     }

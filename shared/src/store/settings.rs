@@ -60,7 +60,7 @@ impl<F: NorFlash> Store<F> {
     pub async fn erase_settings(&mut self) -> Result<(), StoreError> {
         self.settings = Err(SettingsError::Corrupt);
         self.lost = None;
-        Pages(&mut self.flash)
+        Pages(&mut self.flash, &mut self.erasures)
             .wipe()
             .await
             .map_err(StoreError::flash)?;
@@ -269,7 +269,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Brings the pages into order, and looks whether they can be read.
     pub(super) async fn open_settings(&mut self) -> Result<(), StoreError> {
-        Pages(&mut self.flash)
+        Pages(&mut self.flash, &mut self.erasures)
             .recover()
             .await
             .map_err(StoreError::flash)?;
@@ -319,7 +319,7 @@ impl<F: NorFlash> Store<F> {
     fn map(&mut self) -> Map<'_, F> {
         let config = const { MapConfig::new(0..2 * page_size::<F>() as u32) };
         MapStorage::new(
-            Pages(&mut self.flash),
+            Pages(&mut self.flash, &mut self.erasures),
             config,
             Cache::new(Uncached, Uncached, ArrayKeyPointers::new()),
         )
@@ -368,7 +368,7 @@ impl<F: NorFlash> Store<F> {
         for _ in 0..TRIES {
             // after a write that failed, or was given up
             if mem::replace(&mut self.is_unsure, true) {
-                let sealed = Pages(&mut self.flash).seal().await;
+                let sealed = Pages(&mut self.flash, &mut self.erasures).seal().await;
                 sealed.map_err(StoreError::flash)?;
             }
             self.map().store_item(&mut buffer, &key, &bytes).await?;

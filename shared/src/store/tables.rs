@@ -10,7 +10,7 @@ use super::layout::{
 use super::sectors::Store;
 use crate::CRC32;
 use crate::sensor::FingerCode;
-use crate::table::{Table, TableError};
+use crate::table::{self, Table, TableError};
 
 const CHUNK: usize = 128;
 
@@ -54,9 +54,9 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Begins a table of `length` bytes: of the two slots for such tables, erases the one that is not in use, or has
-    /// the older table. The table in use stays until the new one is committed. One that was begun before and not
-    /// committed is given up.
+    /// Begins a table of `length` bytes, in a slot of which the loss matters least: see [`crate::store`]. That is erased
+    /// when the header of a table of this length has come, not before. The table in use stays until the new one is
+    /// committed. One that was begun before and not committed is given up.
     pub async fn begin_table(&mut self, length: usize) -> Result<(), StoreError> {
         self.slots.push = None;
         if length > Self::MAX_TABLE {
@@ -65,26 +65,23 @@ impl<F: NorFlash> Store<F> {
                 capacity: Self::MAX_TABLE,
             });
         }
-        let pair = if length <= Slot::A.capacity::<F>() {
-            Slot::SMALL
-        } else {
-            Slot::LARGE
-        };
-        let slot = self.slots.next(pair);
-        *self.slots.usable(slot) = 0;
-        self.erase(slot.start::<F>(), slot.end::<F>()).await?;
+        if length < table::HEADER {
+            let (got, wanted) = (length, table::HEADER);
+            return Err(StoreError::Table(TableError::Truncated { got, wanted }));
+        }
         self.slots.push = Some(Push {
-            slot,
+            slot: self.slots.next::<F>(length),
             length,
             at: 0,
             word: [0xFF; WORD],
+            header: [0; table::HEADER],
         });
         Ok(())
     }
 
     /// Writes the next part of the table, of any size; `offset` says where it belongs. Offset and length are checked
-    /// before anything is written. Errors: [`StoreError::NoTable`], [`StoreError::Part`]; [`StoreError::Flash`], after
-    /// which the table must be begun anew.
+    /// before anything is written. Errors: [`StoreError::NoTable`], [`StoreError::Part`]; [`StoreError::Flash`] and
+    /// [`StoreError::Table`], after which the table must be begun anew.
     pub async fn write_table(&mut self, offset: usize, bytes: &[u8]) -> Result<(), StoreError> {
         // taken out, so that a part that fails or is cancelled ends the table
         let mut push = self.slots.push.take().ok_or(StoreError::NoTable)?;
@@ -93,11 +90,26 @@ impl<F: NorFlash> Store<F> {
             self.slots.push = Some(push);
             return Err(StoreError::Part { offset, wanted });
         }
-        let table = push.slot.start::<F>() + TABLE_AT;
+        let table_at = push.slot.start::<F>() + TABLE_AT;
         let mut rest = bytes;
+        if push.at < table::HEADER {
+            let (now, tail) = rest.split_at(rest.len().min(table::HEADER - push.at));
+            for (to, from) in push.header.iter_mut().skip(push.at).zip(now) {
+                *to = *from;
+            }
+            push.at += now.len();
+            rest = tail;
+            if push.at == table::HEADER && !now.is_empty() {
+                Table::check_header(&push.header, push.length).map_err(StoreError::Table)?;
+                *self.slots.usable(push.slot) = 0;
+                self.erase(push.slot.start::<F>(), push.slot.end::<F>())
+                    .await?;
+                self.program(table_at, &push.header).await?;
+            }
+        }
         while !rest.is_empty() {
             let within = push.at % WORD;
-            let word_at = table + (push.at - within) as u32;
+            let word_at = table_at + (push.at - within) as u32;
             if within == 0 && rest.len() >= WORD {
                 let (whole, tail) = rest.split_at(rest.len() - rest.len() % WORD);
                 self.program(word_at, whole).await?;
@@ -156,12 +168,14 @@ impl<F: NorFlash> Store<F> {
         let mut back = [0; HEADER];
         self.read(start, &mut back).await?;
         if back != header {
+            self.slots.set_worn(slot);
             return Err(StoreError::Worn);
         }
         self.program(start + COMMIT_AT, &COMMIT.to_le_bytes())
             .await?;
         self.slots.generation = stored.generation;
         if self.commit_word(slot).await? != COMMIT {
+            self.slots.set_worn(slot);
             // it may count as one, with bits that are wrong
             self.give_up(slot).await?;
             return Err(StoreError::Worn);

@@ -217,10 +217,15 @@ fn a_table_that_is_not_whole_is_refused_and_the_former_one_stays() {
         let mut longer = old.clone();
         longer.push(0);
         store.begin_table(longer.len()).await.unwrap();
-        store.write_table(0, &longer).await.unwrap();
+        let length = TableError::Length {
+            header: old.len(),
+            contents: longer.len(),
+        };
+        let refused = store.write_table(0, &longer).await;
+        assert_eq!(refused, Err(StoreError::Table(length)));
         assert!(matches!(
             store.commit_table(None, &mut buffer).await,
-            Err(StoreError::Table(TableError::Behind(1)))
+            Err(StoreError::NoTable)
         ));
     });
     assert_eq!(used(&mut store), Some(new.clone()));
@@ -268,19 +273,25 @@ fn a_table_of_another_finger_is_refused_and_the_former_one_stays() {
 #[test]
 fn a_table_goes_to_the_smallest_sector_that_it_fits_into() {
     let mut store = open(Ram::new());
+    let header = |length: usize| {
+        let mut header = table(0)[..16].to_vec();
+        header[8..12].copy_from_slice(&(length as u32).to_le_bytes());
+        header
+    };
     for (length, worn) in [
         (SECTOR - 32, [1, 0, 0, 0, 0, 0]),
         (SECTOR - 31, [1, 0, 0, 0, 1, 0]),
         (4 * SECTOR - 32, [1, 0, 0, 0, 2, 0]),
     ] {
         block_on(store.begin_table(length)).unwrap();
+        block_on(store.write_table(0, &header(length))).unwrap();
         assert_eq!(store.flash.worn, worn, "{length}");
     }
-    // in turn, once they are committed
+    // in turn, once they are committed; small ones go to a large sector where both small ones are kept
     for n in [2, 3, 6, 0, 1, 4] {
         block_on(push(&mut store, &any_table(n), 64)).unwrap();
     }
-    assert_eq!(store.flash.worn, [3, 1, 0, 0, 4, 1]);
+    assert_eq!(store.flash.worn, [2, 1, 0, 0, 4, 2]);
 }
 
 /// Whatever sectors they are in: the one before the newest is in use where that is damaged, and so on to the first.
@@ -292,8 +303,10 @@ fn the_tables_before_the_newest_one_stay_until_their_slot_is_wanted() {
         (&[2, 0], &[0, 2]),
         (&[0, 1, 2, 3], &[3, 2, 1, 0]),
         (&[2, 0, 3, 1], &[1, 3, 0, 2]),
-        // the older one of its pair gives way, never the newest
+        // the oldest one gives way, never one of the newest two unless all are large
         (&[0, 1, 2, 4], &[4, 2, 1]),
+        (&[0, 1, 4], &[4, 1, 0]),
+        (&[0, 1, 4, 5], &[5, 4, 1]),
         (&[0, 2, 3, 6], &[6, 3, 0]),
         (&[0, 2, 3, 1, 4], &[4, 1, 3, 2]),
     ] {
@@ -468,7 +481,8 @@ fn damaged_settings_are_reported_and_erased_without_the_tables() {
                 SettingsError::Corrupt
             }
             _ => {
-                let mut pages = super::pages::Pages(&mut ram);
+                let mut erasures = 0;
+                let mut pages = super::pages::Pages(&mut ram, &mut erasures);
                 block_on(pages.wipe()).unwrap();
                 let mut map = sequential_storage::map::MapStorage::<u8, _, _>::new(
                     pages,

@@ -20,7 +20,8 @@ pub(super) const MS: usize = 2;
 pub(super) const LENGTH: u16 = 6;
 pub(super) const GAUSSIANS: u8 = 0;
 pub(super) const FUSED: u8 = 1;
-pub(super) const HEADER: usize = 16;
+/// Bytes of a table's header.
+pub(crate) const HEADER: usize = 16;
 pub(super) const MOVEMENT_BYTES: usize = 6;
 pub(super) const PROPERTIES: usize = Property::ALL.len();
 pub(super) const CELL_BYTES: usize = 4;

@@ -58,18 +58,10 @@ impl<'a> Table<'a> {
             wanted,
         };
         let header: [u8; HEADER] = array(bytes, 0).ok_or(truncated(HEADER))?;
-        let magic = array(&header, 0).unwrap_or_default();
-        if magic != MAGIC {
-            return Err(TableError::Magic(magic));
-        }
-        let number = |at| array(&header, at).map_or(0, u16::from_le_bytes);
-        let (version, textures) = (number(4), number(12));
+        let length = Self::length_of_header(&header)?;
+        let textures = array(&header, 12).map_or(0, u16::from_le_bytes);
         let [code, what] = array(&header, 6).unwrap_or_default();
         let [movements, features] = array(&header, 14).unwrap_or_default();
-        if version != VERSION {
-            return Err(TableError::Version(version));
-        }
-        let length = array(&header, 8).map_or(0, u32::from_le_bytes) as usize;
         let bytes = bytes.get(..length).ok_or(truncated(length))?;
         let (body, stored) = bytes.split_last_chunk().ok_or(TableError::Length {
             header: length,
@@ -106,6 +98,33 @@ impl<'a> Table<'a> {
             return Err(TableError::Section(LENGTH));
         }
         Ok(table)
+    }
+
+    /// The length of the table that begins with this header. Errors: it is no table's.
+    fn length_of_header(header: &[u8; HEADER]) -> Result<usize, TableError> {
+        let magic = array(header, 0).unwrap_or_default();
+        if magic != MAGIC {
+            return Err(TableError::Magic(magic));
+        }
+        let version = array(header, 4).map_or(0, u16::from_le_bytes);
+        if version != VERSION {
+            return Err(TableError::Version(version));
+        }
+        Ok(array(header, 8).map_or(0, u32::from_le_bytes) as usize)
+    }
+
+    /// Checks that a table of `wanted` bytes may begin with this header.
+    pub(crate) fn check_header(header: &[u8; HEADER], wanted: usize) -> Result<(), TableError> {
+        let length = Self::length_of_header(header)?;
+        let textures = array(header, 12).map_or(0, u16::from_le_bytes);
+        match length == wanted {
+            false => Err(TableError::Length {
+                header: length,
+                contents: wanted,
+            }),
+            true if usize::from(textures) > MAX_TEXTURES => Err(TableError::Textures(textures)),
+            true => Ok(()),
+        }
     }
 
     #[inline]

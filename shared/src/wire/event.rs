@@ -265,6 +265,9 @@ pub struct Counts {
     pub lost_reports: u32,
     /// Frames from the host that were damaged.
     pub damaged_frames: u32,
+    /// Sectors of the flash that were erased: each bears it 10,000 times. Older logs do not say.
+    #[serde(default)]
+    pub erasures: u32,
 }
 
 /// What one slide says.

@@ -101,6 +101,11 @@ pub enum MemoryError {
     StoredTable(TableError),
     #[error("the stored table cannot be read, and the one stored before it is in its place: {0}")]
     NewestTable(TableError),
+    #[error(
+        "the probe was reset while it read its stored table, and that of the firmware is in its place: push a table, or \
+         go back to the firmware's"
+    )]
+    Unread,
 }
 
 /// Why a slide does not count; `E` is why a rig failed.
@@ -166,6 +171,10 @@ pub enum Failure {
     NoLimits,
     #[error("the share of false alarms must be from 0.0005 to 0.2")]
     FalseAlarm,
+    #[error(
+        "nobody pressed the blue button on the board within 30 s: allow high forces again, and press it"
+    )]
+    NotPressed,
 }
 
 /// What a rig gets over by itself asks nothing of a person.

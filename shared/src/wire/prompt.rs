@@ -56,4 +56,6 @@ pub enum Prompt {
     Still,
     #[error("turn it over, so that it points straight up, and keep it still")]
     TurnOver,
+    #[error("press the blue button on the board: movements may press with up to 2 N then")]
+    Button,
 }

@@ -84,9 +84,7 @@ impl Obedient {
             Some(Prompt::Slide) => (self.presses_mn, 40.0),
             Some(Prompt::Weigh(mn)) if self.wrong == Some(mn) => (1177.0, 0.0),
             Some(Prompt::Weigh(mn)) => (mn.into(), 0.0),
-            Some(Prompt::Lift | Prompt::Again(_) | Prompt::Still | Prompt::TurnOver) | None => {
-                (0.0, 0.0)
-            }
+            _ => (0.0, 0.0),
         }
     }
 }
@@ -100,7 +98,7 @@ impl Hand for Obedient {
         let (g, zero) = self.g;
         let way = match self.prompt {
             // it takes a while
-            Some(Prompt::TurnOver) if self.since > 40 => -1.0,
+            Some(Prompt::TurnOver | Prompt::Button) if self.since > 40 => -1.0,
             _ => 1.0,
         };
         let trembles = if self.ticks.is_multiple_of(2) {

@@ -33,6 +33,8 @@ struct Standing {
     lay_mn: List<f32>,
     /// P_DC, which follows what is laid on by 20 counts a look.
     counts: f32,
+    /// The board's button at each look.
+    button: fn(u32) -> Option<bool>,
 }
 
 impl Standing {
@@ -48,6 +50,7 @@ impl Standing {
             expected: List::new(),
             lay_mn: List::new(),
             counts: 3.0,
+            button: |_| None,
         })
     }
 }
@@ -76,6 +79,10 @@ impl Servo for Standing {
         if self.looks >= self.faults {
             self.state.phase = Phase::Faulted(Fault::SensorSilent);
         }
+    }
+
+    fn pressed(&self) -> Option<bool> {
+        (self.button)(self.looks)
     }
 
     fn state(&self) -> RigState {
@@ -155,4 +162,42 @@ fn a_reversed_cell_a_stop_a_fault_and_nobody_end_it() {
     let mut rig = Standing::rig(1e6);
     assert_eq!(weigh(&mut rig), failed(RigError::NobodyThere));
     assert_eq!(rig.servo.prompts.len(), 60);
+}
+
+/// High forces want a press of the board's button: one that was let go before, within 30 s.
+#[test]
+fn a_high_force_is_allowed_by_a_person_at_the_board() {
+    use crate::store::tests::ram::{Ram, SECTOR};
+    type Button = fn(u32) -> Option<bool>;
+    let cases: [(Button, u32, Result<(), Failure>); 6] = [
+        (|_| None, u32::MAX, Ok(())),
+        (|look| Some(look >= 150), u32::MAX, Ok(())),
+        (|_| Some(false), u32::MAX, Err(Failure::NotPressed)),
+        // held down, or broken
+        (|_| Some(true), u32::MAX, Err(Failure::NotPressed)),
+        (|look| Some(!(40..=90).contains(&look)), u32::MAX, Ok(())),
+        (|_| Some(false), 20, Err(Failure::Rig(RigError::Stopped))),
+    ];
+    for (n, (button, stops, done)) in cases.into_iter().enumerate() {
+        let mut rig = Standing::rig(10.9);
+        (rig.servo.button, rig.servo.stops) = (button, stops);
+        let mut store = block_on(Store::open(Ram::<SECTOR>::new())).unwrap();
+        assert_eq!(
+            block_on(rig.set_high_force(true, Ok(&mut store))),
+            done,
+            "{n}"
+        );
+        assert_eq!(block_on(store.high_force()), Ok(done.is_ok()), "{n}");
+        let seconds = rig.servo.looks.div_ceil(LOOKS_HZ) as usize;
+        assert_eq!(rig.servo.prompts, [Prompt::Button].repeat(seconds), "{n}");
+        assert!(rig.servo.looks <= 30 * LOOKS_HZ);
+        // forbidding wants none
+        let looks = rig.servo.looks;
+        rig.servo.stops = u32::MAX;
+        block_on(rig.set_high_force(false, Ok(&mut store))).unwrap();
+        assert_eq!(
+            (rig.servo.looks, block_on(store.high_force())),
+            (looks, Ok(false))
+        );
+    }
 }

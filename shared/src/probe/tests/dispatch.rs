@@ -15,7 +15,7 @@ use std::boxed::Box;
 use std::string::ToString;
 
 const SECTOR: usize = 16_384;
-type Flash = Ram<SECTOR>;
+pub(super) type Flash = Ram<SECTOR>;
 
 const CALIBRATION: RigCalibration = RigCalibration {
     pressure: crate::sensor::pressure::Calibration::PAPER,
@@ -30,7 +30,7 @@ const CALIBRATION: RigCalibration = RigCalibration {
 const JAMS: RigError = RigError::Fault(Fault::LeverNotHome);
 
 /// A rig that feels what its script says, at whatever is commanded.
-struct Bench {
+pub(super) struct Bench {
     script: Script,
     state: RigState,
     homed: u32,
@@ -114,7 +114,7 @@ impl RigHandle for Bench {
 
 /// The stored table, copied.
 #[derive(Default)]
-struct Copied(vec::Vec<u8>);
+pub(super) struct Copied(vec::Vec<u8>);
 
 impl StoredBytes<Flash> for Copied {
     fn finger(&self) -> FingerCode {
@@ -129,9 +129,10 @@ impl StoredBytes<Flash> for Copied {
 }
 
 #[derive(Default)]
-struct Heard {
-    told: vec::Vec<Event>,
-    tables: vec::Vec<TableInUse>,
+pub(super) struct Heard {
+    pub(super) told: vec::Vec<Event>,
+    pub(super) tables: vec::Vec<TableInUse>,
+    pub(super) erased: u32,
 }
 
 impl Events for Heard {
@@ -142,9 +143,13 @@ impl Events for Heard {
     fn table(&mut self, table: TableInUse) {
         self.tables.push(table);
     }
+
+    fn erased(&mut self, sectors: u32) {
+        self.erased = sectors;
+    }
 }
 
-type Tested = Probe<'static, Bench, Flash, Copied, Heard>;
+pub(super) type Tested = Probe<'static, Bench, Flash, Copied, Heard>;
 
 /// A probe whose factory's table is this one, on a store or on a broken one.
 fn probe_with(factory: vec::Vec<u8>, store: Option<Store<Flash>>) -> Tested {
@@ -170,7 +175,7 @@ fn probe_with(factory: vec::Vec<u8>, store: Option<Store<Flash>>) -> Tested {
     probe
 }
 
-fn probe() -> Tested {
+pub(super) fn probe() -> Tested {
     probe_with(
         fused_table(),
         Some(block_on(Store::open(Ram::new())).unwrap()),
@@ -256,12 +261,12 @@ fn a_table_whose_bytes_have_changed_is_reported_whatever_is_in_its_place() {
     }
 }
 
-fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
+pub(super) fn command(probe: &mut Tested, command: Command) -> Result<(), String> {
     let done = block_on(probe.perform(&command));
     done.map(drop).map_err(|why| why.to_string())
 }
 
-fn name(name: &str) -> Name {
+pub(super) fn name(name: &str) -> Name {
     Name::try_from(name).unwrap()
 }
 
@@ -607,7 +612,7 @@ fn a_high_force_holds_only_where_it_is_kept() {
 }
 
 /// Sends a table in parts, each twice.
-fn push(probe: &mut Tested, bytes: &[u8]) -> Result<(), String> {
+pub(super) fn push(probe: &mut Tested, bytes: &[u8]) -> Result<(), String> {
     command(probe, Command::BeginTable(bytes.len() as u32))?;
     for (part, offset) in bytes.chunks(PART).zip((0..).step_by(PART)) {
         let write = Command::WriteTable {

@@ -331,7 +331,9 @@ fn a_cut_in_the_recovery_from_a_cut_loses_nothing() {
                             }
                             // the cut fell into the opening, which kept the flash: let it happen without the store
                             Err(_) => {
-                                let mut pages = super::super::pages::Pages(&mut flash);
+                                let mut erasures = 0;
+                                let mut pages =
+                                    super::super::pages::Pages(&mut flash, &mut erasures);
                                 let _ = block_on(pages.recover());
                                 flash.again()
                             }

@@ -191,6 +191,72 @@ fn a_refused_table_is_not_in_force_after_the_next_start() {
         assert_eq!(used(&mut store), Some(old.clone()), "{keep}");
         assert_eq!(store.damaged_table(), None);
     }
+    // and it can be pushed to another place
+    let mut store = open(Ram::new());
+    block_on(push(&mut store, &old, 64)).unwrap();
+    store.flash.stuck = vec![(SECTOR + 28, 4)];
+    block_on(push(&mut store, &new, 64)).unwrap_err();
+    block_on(push(&mut store, &new, 64)).unwrap();
+    assert_eq!(used(&mut open(store.close().again())), Some(new));
+}
+
+/// Whatever a host begins and does not end: the table in use stays, and the one before it for when that is damaged.
+#[test]
+fn the_table_before_the_newest_stays_until_a_new_one_is_whole() {
+    for (first, second, begun) in [(0, 1, 4), (0, 1, 2), (0, 2, 1), (2, 0, 6), (2, 1, 5)] {
+        let mut store = open(Ram::new());
+        for n in [first, second] {
+            block_on(push(&mut store, &any_table(n), 64)).unwrap();
+        }
+        let new = any_table(begun);
+        block_on(store.begin_table(new.len())).unwrap();
+        block_on(store.write_table(0, &new[..new.len() - 1])).unwrap();
+        let mut store = open(store.close().again());
+        assert_eq!(used(&mut store), Some(any_table(second)));
+        let newest = store.table().unwrap().offset as usize;
+        store.flash.bytes[newest + 40] ^= 1;
+        let mut store = open(store.close().again());
+        assert_eq!(
+            used(&mut store),
+            Some(any_table(first)),
+            "{first} {second} {begun}"
+        );
+    }
+}
+
+/// A request to begin a table, and bytes that are none, erase nothing.
+#[test]
+fn nothing_is_erased_before_a_table_has_begun() {
+    let mut store = open(Ram::new());
+    for n in [2, 3] {
+        block_on(push(&mut store, &any_table(n), 64)).unwrap();
+    }
+    let (erases, new) = (store.flash.erases, any_table(6));
+    for _ in 0..50 {
+        block_on(store.begin_table(new.len())).unwrap();
+        block_on(store.write_table(0, &new[..15])).unwrap();
+    }
+    let mut other = new.clone();
+    for at in [0, 4, 8, 13] {
+        other[at] ^= 1;
+        block_on(store.begin_table(new.len())).unwrap();
+        let refused = block_on(store.write_table(0, &other));
+        assert!(matches!(refused, Err(StoreError::Table(_))), "{at}");
+        assert_eq!(
+            block_on(store.write_table(0, &new)),
+            Err(StoreError::NoTable)
+        );
+        other[at] ^= 1;
+    }
+    for length in [0, 1, 15] {
+        assert!(matches!(
+            block_on(store.begin_table(length)),
+            Err(StoreError::Table(_))
+        ));
+    }
+    assert_eq!(store.flash.erases, erases);
+    assert_eq!(store.erasures() as usize, erases);
+    assert_eq!(used(&mut store), Some(any_table(3)));
 }
 
 #[test]

@@ -45,6 +45,7 @@ impl Slowed {
                 counts
                     == Counts {
                         slots: counts.slots,
+                        erasures: counts.erasures,
                         ..Counts::default()
                     },
                 format!("{counts:?}"),
