@@ -2,6 +2,7 @@
 
 mod convert;
 mod device;
+mod endings;
 mod kills;
 mod offline;
 mod refusals;
