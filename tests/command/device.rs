@@ -3,6 +3,8 @@
 
 #[path = "device/client.rs"]
 mod client;
+#[path = "device/hostile.rs"]
+mod hostile;
 #[path = "device/lines.rs"]
 mod lines;
 #[path = "device/package.rs"]

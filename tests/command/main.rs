@@ -2,6 +2,7 @@
 
 mod convert;
 mod device;
+mod endings;
 mod import;
 mod kills;
 mod offline;

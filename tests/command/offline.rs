@@ -417,7 +417,7 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
             let moved = slide.map_or("moved", |slide| labels(fields[1], slide));
             Some(format!("{line},{moved}"))
         });
-        at.printed("learn --recordings slides --train-slides 2 --out table");
+        at.printed("learn --recordings slides --train-slides 2 --out table --force");
         let shown = at.json("table table", 0);
         let of = |t: &Value| {
             (

@@ -7,6 +7,7 @@ use tactus_lab::data::recordings::files::sha256;
 use tactus_lab::data::recordings::npy;
 use tactus_tests::properties_csv;
 
+use crate::kills::files;
 use crate::{SIMULATED, Scratch, assert_says};
 
 /// Rows of a text, each split at `=>`.
@@ -18,12 +19,17 @@ fn rows(text: &str) -> impl Iterator<Item = (&str, &str)> {
 #[test]
 fn senseless_arguments_are_refused_with_a_hint() {
     let at = good();
+    let before = files(&at.path(""));
     for (line, hints) in rows(include_str!("refusals.txt")) {
         let (code, line) = line.split_once(' ').unwrap();
         let said = at.error(line, code.parse().unwrap());
         for hint in hints.split(" + ") {
             assert!(said.contains(hint), "{line}: {said}");
         }
+        assert!(
+            files(&at.path("")) == before,
+            "{line}: something was written"
+        );
     }
     // the environment does not stand in the way of what was asked for
     let features = at

@@ -28,8 +28,8 @@ pub enum PortError {
     Garbage(u64),
     /// Reports come, and the request does not end.
     #[error(
-        "the probe has not ended the request {request} in {longest:?}, which is longer than it takes, or sent more than \
-         that long a time of reports: switch it off and on, then ask again"
+        "the probe has not ended the request {request} within {longest:?} or the bytes of that time, the most that it \
+         can take: switch it off and on, then ask again"
     )]
     Endless {
         /// What was asked for.

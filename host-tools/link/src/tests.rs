@@ -446,6 +446,207 @@ fn gaps_in_the_numbers_are_counted() {
     assert_eq!((session.damaged(), session.missing()), (0, 2));
 }
 
+fn slide_report(change: impl FnOnce(&mut wire::SlideReport), posterior: &[f32]) -> Event {
+    let mut observed = wire::SlideReport {
+        properties: [Some(0.4), Some(3.0), None],
+        roughness_is_bound: false,
+        background: 2.0,
+        bands: Default::default(),
+        pressure: None,
+        pace: None,
+    };
+    change(&mut observed);
+    Event::SlideReport {
+        slide: 1,
+        action: tactus_core::table::Action {
+            movement: 0,
+            property: None,
+        },
+        observed,
+        posterior: posterior.iter().copied().collect(),
+    }
+}
+
+fn verdict(change: impl FnOnce(&mut Verdict)) -> Event {
+    let mut verdict = Verdict {
+        texture: 1,
+        name: Name::try_from("cork").unwrap(),
+        probability: 0.995,
+        sure: true,
+        unknown: false,
+        log_odds: Some(-7.5),
+        slides: 3,
+        wants_label: false,
+        changed: false,
+    };
+    change(&mut verdict);
+    Event::Verdict(verdict)
+}
+
+/// Whole frames with a right checksum, of a probe that is broken, or hostile.
+#[test]
+fn reports_that_no_probe_makes_are_damaged_ones() {
+    let name = |name: &str| Name::try_from(name).unwrap();
+    let learned = |texture: &str| {
+        Event::TextureLearned(TextureLearned {
+            name: name(texture),
+            slides: 3,
+            itself: true,
+        })
+    };
+    let said = |text: &str| Failure::Said(wire::text(text));
+    let part = |offset, length, bytes: usize| Event::TablePart {
+        offset,
+        length,
+        bytes: vec![0; bytes].into_iter().collect(),
+    };
+    let good = [
+        verdict(|_| ()),
+        verdict(|v| (v.probability, v.log_odds) = (1.0, None)),
+        verdict(|v| v.name = name("Ölpapier 2 µm")),
+        slide_report(|_| (), &[0.25, 0.75]),
+        slide_report(|o| o.properties = [None; 3], &[]),
+        learned("cork"),
+        part(256, 300, 44),
+        part(0, 512, PART),
+        Event::Trouble(said("press the button")),
+        Event::Weighed {
+            mn: 1,
+            counts: -3.5,
+        },
+    ];
+    let bad = [
+        verdict(|v| v.probability = f32::NAN),
+        verdict(|v| v.probability = 2.0),
+        verdict(|v| v.probability = -0.5),
+        verdict(|v| v.log_odds = Some(f32::INFINITY)),
+        verdict(|v| v.texture = 5000),
+        verdict(|v| v.name = name("\u{1b}]0;evil\u{7}")),
+        verdict(|v| v.name = name("a\u{202e}b")),
+        verdict(|v| v.name = name("")),
+        slide_report(|_| (), &[f32::INFINITY, 0.5]),
+        slide_report(|_| (), &[1.5]),
+        slide_report(|_| (), &[0.9, 0.9]),
+        slide_report(|o| o.background = -1.0, &[1.0]),
+        slide_report(|o| o.background = f32::NAN, &[1.0]),
+        slide_report(|o| o.properties[1] = Some(f32::INFINITY), &[1.0]),
+        learned("a\nb"),
+        part(0, u32::MAX, PART),
+        part(4096, 4000, PART),
+        part(u32::MAX, 300, 1),
+        // a byte a part would take hours
+        part(0, 300, 1),
+        Event::Trouble(said("\u{1b}[2J")),
+        Event::Refused {
+            id: 0,
+            why: Failure::Memory(wire::MemoryError::Unknown(name("a\rb"))),
+        },
+        Event::Weighed {
+            mn: 1,
+            counts: f32::NAN,
+        },
+        Event::Turned {
+            g_counts: f32::NAN,
+            offset_counts: 0.0,
+        },
+    ];
+    for (event, is_good) in good
+        .map(|e| (e, true))
+        .into_iter()
+        .chain(bad.map(|e| (e, false)))
+    {
+        let frame = Probe::default().event(event.clone());
+        let (mut session, mut send) = (Session::default(), Vec::new());
+        let reports = session.receive(&frame);
+        let damaged = u64::from(!is_good);
+        assert_eq!(
+            (reports.len() == 1, session.damaged()),
+            (is_good, damaged),
+            "{event:?}"
+        );
+        let request = Request::command(Command::Home);
+        let mut job = Job::begin(request, &mut session, &mut send).unwrap();
+        let polled = job.poll(&mut session, &frame, &mut send, |_| ());
+        let is_refused = matches!(polled, Poll::Ready(Err(LinkError::Impossible(_))));
+        assert_eq!(is_refused, !is_good, "{event:?}");
+    }
+}
+
+/// The longest that a request goes on while such a probe says this every 50 ms, s; the error at its end.
+fn goes_on<E: Transaction>(request: E, event: &Event, times: usize) -> (u64, String)
+where
+    E::Outcome: std::fmt::Debug,
+{
+    let time = Duration::from_secs(5);
+    let host = super::Probe::new("here", time, time);
+    let mut probe = Probe::default();
+    let mut get = std::pin::pin!(host.get(request));
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    for ms in (0..).step_by(50) {
+        let says: Vec<u8> = (0..times)
+            .flat_map(|_| probe.event(event.clone()))
+            .collect();
+        host.carry(&says, Duration::from_millis(ms));
+        host.to_send();
+        host.said();
+        if let Poll::Ready(done) = get.as_mut().poll(&mut context) {
+            return (ms / 1000, done.unwrap_err().to_string());
+        }
+    }
+    unreachable!()
+}
+
+#[test]
+fn no_request_goes_on_without_an_end() {
+    let live = Event::Live(wire::Live {
+        force_mn: 0,
+        steps: 0,
+        stage_um: 0,
+        speed_um_s: 0,
+        current_ma: 0,
+    });
+    let (s, why) = goes_on(Request::status(), &live, 1);
+    assert_eq!(s, 30);
+    let status = ["the request Status", "30s", "switch it off and on"];
+    assert!(status.iter().all(|words| why.contains(words)), "{why}");
+    // as many bytes as the line carries in that time, at once
+    let (s, why) = goes_on(Request::status(), &live, 20_000);
+    assert!(s < 5 && why.contains("the request Status"), "{s} s: {why}");
+    let (s, why) = goes_on(Request::command(Command::Home), &live, 1);
+    assert_eq!(s, 270);
+    assert!(
+        why.contains("the request Home") && why.contains("emergency stop"),
+        "{why}"
+    );
+    let (slides, movements) = (u64::from(identify().max_slides), 36);
+    let (s, why) = goes_on(Request::identify(identify()), &live, 1);
+    assert_eq!(s, 30 + (slides + 2 * movements) * 135, "{why}");
+    let (s, why) = goes_on(ReadTable::default(), &Event::Phase(Phase::Ready), 1);
+    assert_eq!(s, 300);
+    assert!(why.contains("the request ReadTable"), "{why}");
+}
+
+#[test]
+fn an_echo_is_none_of_another_version() {
+    let requests = [
+        Command::Status,
+        Command::Home,
+        Command::ReadTable(300),
+        Command::Stream(true),
+    ];
+    for command in requests {
+        let (mut session, mut send) = (Session::default(), Vec::new());
+        let request = Request::command(command.clone());
+        let mut job = Job::begin(request, &mut session, &mut send).unwrap();
+        let sent = std::mem::take(&mut send);
+        let polled = job.poll(&mut session, &sent, &mut send, |_| ());
+        assert!(
+            matches!(polled, Poll::Ready(Err(LinkError::Echo))),
+            "{command:?}"
+        );
+    }
+}
+
 #[test]
 fn an_outsider_may_ask_in_between() {
     let (mut session, mut send, mut probe) = (Session::default(), Vec::new(), Probe::default());

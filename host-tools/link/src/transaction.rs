@@ -76,8 +76,8 @@ impl<E: Transaction> Job<E> {
                 over = self.take(session, &report.event, send).transpose();
             }
         }
-        if over.is_none() {
-            over = session.refused.take().map(Err);
+        if let (Some(why), None | Some(Err(_))) = (session.refused.take(), &over) {
+            over = Some(Err(why));
         }
         let disturbed = session.damaged() + session.missing() > lost;
         if over.is_none() && disturbed && self.last_id() == sent {

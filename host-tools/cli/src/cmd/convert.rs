@@ -36,7 +36,9 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let Args { from, mcap, force } = args;
-    convert(Output::create(mcap, *force)?, from)?;
+    let log = convert(Output::create(mcap, *force)?, from)?;
+    let written = log.failed.and_then(|()| log.to.finish());
+    written.with_context(|| mcap.display().to_string())?;
     if !is_pipe(mcap) {
         let bytes = std::fs::metadata(mcap)?.len();
         writeln!(out, "{}: {bytes} bytes", mcap.display())?;
@@ -218,16 +220,16 @@ fn foxglove_log() -> Value {
     })
 }
 
-fn convert(to: Output, from: &Path) -> anyhow::Result<()> {
+fn convert(to: Output, from: &Path) -> anyhow::Result<Converted> {
+    let name = || from.display().to_string();
     let mut log = Converted::new(to, from)?;
-    log::read(opened(from)?, |line| {
+    log::read(opened(from).with_context(name)?, |line| {
         if log.failed.is_ok() {
             log.failed = log.line(&line);
         }
     })
-    .with_context(|| from.display().to_string())?;
-    log.failed?;
-    log.to.finish()
+    .with_context(name)?;
+    Ok(log)
 }
 
 struct Converted {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use anyhow::bail;
+use anyhow::{Context as _, bail};
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_link::Request;
@@ -50,8 +50,9 @@ const TRIES: u32 = 3;
 const HELLO: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    std::fs::create_dir_all(&how.report)?;
-    let mut journal = Journal::open(&how.report.join("journal.jsonl"))?;
+    let begun = std::fs::create_dir_all(&how.report);
+    let begun = begun.and_then(|()| Journal::open(&how.report.join("journal.jsonl")));
+    let mut journal = begun.with_context(|| format!("--report {}", how.report.display()))?;
     let interrupt = Interrupt::catch()?;
     let place = Where {
         port: how.port.clone(),
