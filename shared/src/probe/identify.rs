@@ -8,7 +8,7 @@ use crate::dsp::Plan;
 use crate::explorer::{
     self, Answer, Config, EpisodeSummary, ExpectedOutcome, Explorer, ExplorerError, LEADING,
 };
-use crate::features::SlideError;
+use crate::features::Measurement;
 use crate::rig::{Rig, RigError};
 use crate::table::{Contents, MAX_TEXTURES, Name, Table};
 use crate::up_to;
@@ -58,11 +58,7 @@ where
     let mut slide: u8 = 1;
     let step = |step: ExplorationStep<'_, RigError>| {
         if let ExplorationStep::Measured(_, measurement, _) = step {
-            measurement
-                .clipped
-                .into_iter()
-                .map(clipped)
-                .for_each(&mut tell);
+            clipped(measurement).map(&mut tell);
         }
         if let Some(event) = event(&step, table, &config, slide) {
             tell(event);
@@ -89,8 +85,9 @@ where
 }
 
 /// The event that P_AC was cut off in a slide that counts.
-pub(super) fn clipped(why: SlideError) -> Event {
-    Event::Trouble(Failure::Slide(Rejection::Slide(why)))
+pub(super) fn clipped(slide: &Measurement) -> Option<Event> {
+    let why = Rejection::Slide(slide.clipped?);
+    Some(Event::Trouble(Failure::Slide(why)))
 }
 
 /// The event of a step of the exploration, in which this slide is the next or has just been made.

@@ -70,11 +70,7 @@ where
         match measured {
             Ok((training_record, measurement)) => {
                 rejected = 0;
-                measurement
-                    .clipped
-                    .into_iter()
-                    .map(clipped)
-                    .for_each(&mut tell);
+                clipped(&measurement).map(&mut tell);
                 store.set_training_record(&training_record).await?;
                 tell(Event::TrainingSlide {
                     movement,

@@ -114,7 +114,7 @@ fn measure_each<T: Send>(
             };
             checks.check(&slide).map_err(|why| {
                 fault(format!(
-                    "{why}. Record it again, or let `tactus import` leave it out"
+                    "{why} (record it again, or let `tactus import` leave it out)"
                 ))
             })?;
             measured.push(of(&plan, &slide).map_err(|why| fault(why.to_string()))?);
