@@ -1,6 +1,7 @@
 // Tests of the page: node page.mjs INDEX.HTML MODULE.WASM REPLIES.JSONL CHROMIUM HOST:PORT
 // At HOST:PORT is the serial port of a probe. With TACTUS_PAGE_ONLY=PART those tests alone whose name has that part.
 import assert from "node:assert/strict";
+import { AsyncLocalStorage } from "node:async_hooks";
 import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
@@ -74,9 +75,10 @@ test("memory stays flat over 60 explorations", async () => {
   return `${(late / 2 ** 20).toFixed(1)} MB`;
 });
 
-let browser;
+// the browser of the row of tests that asks
+const row = new AsyncLocalStorage();
 async function opened(hash, options, run) {
-  const it = await tab(browser, { width: 1280, height: 900, ...options });
+  const it = await tab(row.getStore().browser, { width: 1280, height: 900, ...options });
   try {
     if (options.before) await options.before(it);
     await it.open(url(hash));
@@ -514,11 +516,11 @@ function watch() {
   const guard = new Worker(`
     const { parentPort, workerData } = require("node:worker_threads");
     const { writeSync } = require("node:fs");
-    let name = "the start of the browser", browser = null;
-    parentPort.on("message", now => { name = now.name ?? name; browser = now.browser ?? browser; });
+    const names = new Map(), browsers = new Set();
+    parentPort.on("message", ({ row, name, browser }) => { if (name) names.set(row, name); if (browser) browsers.add(browser); });
     setTimeout(() => {
-      writeSync(1, "FAILED " + name + "\\nnot over: all tests together have " + workerData + " s, and are ended now\\n");
-      if (browser) try { process.kill(-browser, "SIGKILL"); } catch {}
+      writeSync(1, "FAILED " + [...names.values()].join(", or ") + "\\nnot over: all tests together have " + workerData + " s, and are ended now\\n");
+      for (const browser of browsers) try { process.kill(-browser, "SIGKILL"); } catch {}
       process.kill(process.pid, "SIGKILL");
     }, 1000 * workerData);
   `, { eval: true, workerData: ALL_S });
@@ -529,32 +531,48 @@ function watch() {
 let passed = 0, failed = 0;
 const began = Date.now();
 const guard = watch();
-const start = async () => {
-  browser = await launch(chromium);
-  guard.postMessage({ browser: browser.pid });
-};
-try {
-  await start();
-  for (const { name, run } of tests.filter(({ name }) => name.includes(process.env.TACTUS_PAGE_ONLY ?? ""))) {
-    guard.postMessage({ name });
-    const from = Date.now();
-    try {
-      const said = await within(TEST_S, `not over in ${TEST_S} s`, run());
-      passed += 1;
-      console.log(`ok     ${name} (${((Date.now() - from) / 1000).toFixed(1)} s)${said ? `: ${said}` : ""}`);
-    } catch (why) {
-      failed += 1;
-      console.log(`FAILED ${name}\n${why.stack ?? why}`);
-      // the next test gets a browser that nothing hangs in
-      await browser.kill();
-      await start();
+
+/// Tests one after the other, in a browser of their own if they want one.
+async function each(name, some, wantsBrowser) {
+  const here = { browser: null };
+  const start = async () => {
+    guard.postMessage({ row: name, name: `the start of the browser for ${name}` });
+    here.browser = wantsBrowser ? await launch(chromium) : null;
+    guard.postMessage({ row: name, browser: here.browser?.pid });
+  };
+  try {
+    await start();
+    for (const { name: test, run } of some) {
+      guard.postMessage({ row: name, name: test });
+      const from = Date.now();
+      try {
+        const said = await within(TEST_S, `not over in ${TEST_S} s`, row.run(here, run));
+        passed += 1;
+        console.log(`ok     ${test} (${((Date.now() - from) / 1000).toFixed(1)} s)${said ? `: ${said}` : ""}`);
+      } catch (why) {
+        failed += 1;
+        console.log(`FAILED ${test}\n${why.stack ?? why}`);
+        // the next test gets a browser that nothing hangs in
+        await here.browser?.kill();
+        await start();
+      }
     }
+  } catch (why) {
+    failed += 1;
+    console.log(`FAILED the browser\n${why.stack ?? why}`);
+  } finally {
+    await here.browser?.kill();
   }
-} catch (why) {
-  failed += 1;
-  console.log(`FAILED the browser\n${why.stack ?? why}`);
-} finally {
-  await browser?.kill();
 }
+
+const wanted = tests.filter(({ name }) => name.includes(process.env.TACTUS_PAGE_ONLY ?? ""));
+const isSerial = ({ name }) => name.startsWith("a probe at a serial port");
+const isModules = ({ name }) => /^(WebAssembly|memory)/.test(name);
+// the module's tests compute in this thread, which carries the probe's bytes; a probe takes its time, and the processor has some left
+await each("the module", wanted.filter(isModules), false);
+await Promise.all([
+  each("the probe", wanted.filter(isSerial), true),
+  each("the page", wanted.filter(one => !isSerial(one) && !isModules(one)), true),
+]);
 console.log(`${passed} of ${passed + failed} passed in ${((Date.now() - began) / 1000).toFixed(0)} s`);
 process.exit(failed ? 1 : 0);

@@ -134,14 +134,20 @@ pub fn many_rows(bytes: usize) -> Vec<Vec<u8>> {
     );
     let rest = row.strip_prefix("3,felt,1,").expect("our own row");
     let of = |begins: fn(usize) -> String| {
-        let rows = (1..=bytes / (row.len() + 10)).map(|n| format!("{}{rest}\n", begins(n)));
+        // each of its three hashes becomes one of 64 digits
+        let rows = 1..=bytes / (row.len() + 3 * 60 + 10);
+        let rows = rows.map(|n| format!("{}{rest}\n", begins(n)));
         let text = rows.fold(format!("{head}\n"), |text, row| text + &row);
         [text.as_bytes(), file].concat()
     };
-    vec![
+    let all = [
         of(|n| format!("{n},felt {n},1,")),
         of(|n| format!("3,felt,{n},")),
-    ]
+    ];
+    let whole = all
+        .into_iter()
+        .inspect(|rows| assert_eq!(read(rows), Ok(())));
+    whole.collect()
 }
 
 /// Folders that are whole, one of each kind.
