@@ -2,9 +2,10 @@
 //!
 //! The words of the page are in its template, `report/page.html`.
 
-use std::path::{Path, PathBuf};
-use std::{fs, io};
+use std::fs;
+use std::path::Path;
 
+use anyhow::{Context as _, Result, ensure};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use tactus_core::features::Property;
@@ -13,7 +14,7 @@ use tactus_lab::eval::evaluate::Method;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::matrix::{SHADES, matrix};
-use crate::chart::{COLOURS, DrawError, Figure};
+use crate::chart::{COLOURS, Figure};
 use crate::identify::{Column, Identification, METHODS, PairRow, of_pair, pairs_mean, short_name};
 use crate::page::render;
 use crate::pilot::{MostUseful, Pilot, PilotMovement};
@@ -48,49 +49,28 @@ pub struct Study {
     pub identification: Option<Identification>,
 }
 
-/// Reasons why a report cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The folder has something in it.
-    #[error("{}: is not empty; give --out a new folder, so that no study is mixed with another", .0.display())]
-    Taken(PathBuf),
-    /// The system could not write.
-    #[error("{} cannot be written; give --out a folder that can be written", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// A figure failed.
-    #[error(transparent)]
-    Draw(#[from] DrawError),
-    /// The study does not become JSON.
-    #[error("the study cannot be written as JSON; please report this")]
-    Json(#[from] serde_json::Error),
-    /// The page's template fails.
-    #[error("the template of the report's page fails; please report this")]
-    Page(#[from] minijinja::Error),
-}
-
 /// Makes the folder of a report, or takes an empty one. Called before the work, which takes minutes.
-pub fn prepare(folder: &Path) -> Result<(), ReportError> {
-    let error = |source| ReportError::Io {
-        path: folder.to_owned(),
-        source,
-    };
-    fs::create_dir_all(folder).map_err(error)?;
-    match fs::read_dir(folder).map_err(error)?.next() {
-        Some(_) => Err(ReportError::Taken(folder.to_owned())),
-        None => Ok(()),
-    }
+pub fn prepare(folder: &Path) -> Result<()> {
+    let shown = folder.display();
+    let unwritable =
+        || format!("{shown} cannot be written; give --out a folder that can be written");
+    fs::create_dir_all(folder).with_context(unwritable)?;
+    let mut entries = fs::read_dir(folder).with_context(unwritable)?;
+    ensure!(
+        entries.next().is_none(),
+        "{shown}: is not empty; give --out a new folder, so that no study is mixed with another"
+    );
+    Ok(())
 }
 
 /// Writes everything of a study into its folder, the page last.
-pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
+pub fn write(study: &Study, folder: &Path) -> Result<()> {
     let put = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
-        write_whole(&path, bytes).map_err(|source| ReportError::Io { path, source })
+        write_whole(&path, bytes).with_context(|| {
+            let path = path.display();
+            format!("{path} cannot be written; give --out a folder that can be written")
+        })
     };
     for table in study.training.iter().flat_map(|t| &t.tables) {
         put(&table.file, &table.data)?;
@@ -101,7 +81,7 @@ pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
 }
 
 /// study.json.
-pub fn json(study: &Study) -> Result<String, ReportError> {
+pub fn json(study: &Study) -> Result<String> {
     Ok(serde_json::to_string(study)? + "\n")
 }
 
@@ -139,7 +119,7 @@ impl Contents {
     }
 }
 
-fn contents(study: &Study) -> Result<Contents, DrawError> {
+fn contents(study: &Study) -> Result<Contents> {
     let mut all = Contents::default();
     let about = json!({
         "version": study.version,
@@ -175,7 +155,7 @@ fn movement_name((force_n, speed_mm_s): (f32, f32)) -> String {
 }
 
 /// The most useful movements, and fig. 7.
-fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<(), DrawError> {
+fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<()> {
     let useful = |m: &MostUseful| {
         let left = |at: usize| pilot.movements[at].uncertainty[m.property.index()];
         let name = |at: usize| movement_name(pilot.movements[at].at());
@@ -219,7 +199,7 @@ fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<(), DrawError> {
 }
 
 /// Uncertainty by force and speed: the least is framed, movements that wear the skin are grey.
-fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
+fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure> {
     let property = useful.property;
     let left = |m: &PilotMovement| f64::from(m.uncertainty[property.index()]);
     let reached = |m: &&PilotMovement| m.not_reached.is_empty();
@@ -265,7 +245,7 @@ fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
 }
 
 /// Table 3, and the geometric means of fig. 9.
-fn training(training: &Training, all: &mut Contents) -> Result<(), DrawError> {
+fn training(training: &Training, all: &mut Contents) -> Result<()> {
     let mut rows = Vec::new();
     for (c, &movement) in training.correlations.iter().zip(&training.movements) {
         for ((a, b), paper) in [(0, 1), (0, 2), (1, 2)].into_iter().zip(c.paper) {
