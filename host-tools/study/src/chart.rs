@@ -9,8 +9,8 @@ use plotters::prelude::*;
 
 use labels::{Area, lines, place, width};
 pub(crate) use svg::{COLOURS, EM, GREY, WIDTH};
-pub use svg::{DrawError, Figure, escaped};
 use svg::{FONT, Failed, From, INK, Root, TEXT, Tip, caption, figure, write};
+pub use svg::{Figure, escaped};
 
 /// The mark at a point.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -162,7 +162,7 @@ impl<'a> Chart<'a> {
         (LINE * lines(below, EM, WIDTH as i32 - 16).len() as i32) as u32
     }
 
-    pub(crate) fn figure(self, id: impl Into<String>) -> Result<Figure, DrawError> {
+    pub(crate) fn figure(self, id: impl Into<String>) -> anyhow::Result<Figure> {
         figure(id, &self.title, &self.about, self.size, |root| {
             Ok(self.draw(root)?.1)
         })

@@ -25,11 +25,12 @@
 mod features;
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use anyhow::anyhow;
 use serde::Deserialize;
 use tactus_core::features::{Movement, Observation, Properties, fixed};
-use tactus_lab::data::recordings::files::{self, RecordingError};
+use tactus_lab::data::recordings::files;
 use tactus_lab::eval::experiment::{Experiment, ExperimentError};
 
 pub use features::BAND_EDGES;
@@ -111,14 +112,13 @@ impl FabricSet {
 
     /// Reads and measures all fabrics of a folder. Errors: the folder, its manifest or a file of samples cannot be
     /// read, makes no sense or was changed.
-    pub fn open(folder: &Path) -> Result<Self, FabricError> {
+    pub fn open(folder: &Path) -> anyhow::Result<Self> {
         let path = files::inside(folder, MANIFEST, MANIFEST)?;
         let bytes = files::read_bounded(&path, files::MAX_MANIFEST)?;
-        let manifest: Manifest =
-            serde_json::from_slice(&bytes).map_err(|source| FabricError::Manifest {
-                path: path.clone(),
-                source,
-            })?;
+        let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|why| {
+            let path = path.display();
+            anyhow!("{path}: {why}; the layout is that of data/fabricslide")
+        })?;
         for file in &manifest.files {
             files::check_text(&path, "files", &file.fabric)?;
         }
@@ -136,37 +136,6 @@ impl FabricSet {
             slides: slides.concat(),
         })
     }
-}
-
-/// Reasons why fabrics cannot be read.
-#[derive(thiserror::Error, Debug)]
-pub enum FabricError {
-    /// The manifest is none of fabrics.
-    #[error("{}: {source}; the layout is that of data/fabricslide", path.display())]
-    Manifest {
-        /// The manifest.
-        path: PathBuf,
-        /// The JSON reader's complaint.
-        source: serde_json::Error,
-    },
-    /// A slide from which nothing can be measured.
-    #[error(
-        "{}: set-point {} at {} um/s, rep {repetition}: {cause}; fetch the data set again",
-        path.display(), movement.0, movement.1
-    )]
-    Slide {
-        /// The file of samples.
-        path: PathBuf,
-        /// Set-point, and speed in um/s.
-        movement: (u16, u32),
-        /// As in the manifest.
-        repetition: u8,
-        /// The fault.
-        cause: &'static str,
-    },
-    /// A file cannot be read or differs from its manifest.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
 }
 
 /// Set-point, and speed in um/s, of the movements.
@@ -225,7 +194,7 @@ impl File {
     }
 
     /// All samples, hashes checked before and after decompression.
-    fn samples(&self, path: &Path) -> Result<Vec<u8>, FabricError> {
+    fn samples(&self, path: &Path) -> anyhow::Result<Vec<u8>> {
         let bytes = self.bytes();
         // twice the raw size is more than gzip ever needs
         let packed = files::read_bounded(path, bytes * 2 + 4096)?;
@@ -244,23 +213,25 @@ impl File {
         fabric: usize,
         folder: &Path,
         meter: &Meter,
-    ) -> Result<Vec<FabricSlide>, FabricError> {
+    ) -> anyhow::Result<Vec<FabricSlide>> {
         let path = files::inside(folder, MANIFEST, &self.file)?;
         let raw = self.samples(&path)?;
         let mut slides = Vec::new();
         for (index, movement) in movements().enumerate() {
             for repetition in [0, 1] {
-                let fault = |cause| FabricError::Slide {
-                    path: path.clone(),
-                    movement,
-                    repetition,
-                    cause,
+                let fault = |cause| {
+                    let (path, (setpoint, um_s)) = (path.display(), movement);
+                    anyhow!(
+                        "{path}: set-point {setpoint} at {um_s} um/s, rep {repetition}: {cause}; fetch the data set \
+                         again"
+                    )
                 };
                 let recording = self.slides.iter().find(|r| r.is(movement, repetition));
-                let recording = recording.ok_or(fault("the manifest lists no such recording"))?;
+                let recording =
+                    recording.ok_or_else(|| fault("the manifest lists no such recording"))?;
                 for rows in cut(&recording.rows()) {
                     let bytes = raw.get(rows.start * ROW_BYTES..rows.end * ROW_BYTES);
-                    let bytes = bytes.ok_or(fault("the file ends before it"))?;
+                    let bytes = bytes.ok_or_else(|| fault("the file ends before it"))?;
                     let (ln_bands, properties) = meter.measure(bytes).map_err(fault)?;
                     slides.push(FabricSlide {
                         fabric,

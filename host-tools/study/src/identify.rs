@@ -4,7 +4,6 @@
 use serde::Serialize;
 use tactus_core::explorer::Config;
 
-use super::error::StudyError;
 use super::published::{IDENTIFIED, PAIRS};
 use super::slides::{Named, Recorded};
 use tactus_lab::eval::evaluate::{Method, Outcome, Summary, evaluate};
@@ -46,7 +45,7 @@ pub struct Column {
 }
 
 /// All textures with the slides to learn from, and those of [`IDENTIFIED`] with slides to test with.
-pub fn experiment(recorded: &Recorded, seed: u64) -> Result<Experiment, StudyError> {
+pub fn experiment(recorded: &Recorded, seed: u64) -> anyhow::Result<Experiment> {
     let Recorded {
         training,
         validation,
@@ -87,7 +86,7 @@ fn identify(
     method: Method,
     simulations: u64,
     done: impl Fn() + Sync,
-) -> Result<Column, StudyError> {
+) -> anyhow::Result<Column> {
     let outcomes = evaluate(experiment, config(method), simulations, done)?;
     let summary = Summary::new(&outcomes, experiment.names(), MAX_SLIDES);
     let right = |o: &&Outcome| o.identified == o.unknown;
@@ -133,7 +132,7 @@ pub fn pairs(
     experiment: &Experiment,
     simulations: u64,
     done: impl Fn() + Sync,
-) -> Result<Vec<PairRow>, StudyError> {
+) -> anyhow::Result<Vec<PairRow>> {
     let config = Config {
         method: Method::Paper.method(),
         strategy: Method::Paper.strategy(),
@@ -185,7 +184,7 @@ impl Identification {
         experiment: &Experiment,
         simulations: u64,
         done: impl Fn() + Sync,
-    ) -> Result<Self, StudyError> {
+    ) -> anyhow::Result<Self> {
         let columns = METHODS
             .iter()
             .map(|&method| identify(experiment, method, simulations, &done))

@@ -2,7 +2,6 @@
 //! the identification among all 117 textures, beside the published numbers.
 
 pub mod chart;
-mod error;
 pub mod fabricslide;
 pub mod identify;
 pub mod page;
@@ -12,5 +11,3 @@ pub mod published;
 pub mod report;
 pub mod slides;
 pub mod training;
-
-pub use error::StudyError;

@@ -5,10 +5,8 @@ use tactus_core::explorer::{Config, Explorer, Method};
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::table::Table;
 
-use super::error::StudyError;
 use super::published::{MOST_USEFUL, PILOT_TEXTURES, PILOT_TRIALS};
 use super::slides::{Named, Session, StudyWorld, TextureTrials, properties};
-use tactus_lab::eval::evaluate::EvaluateError;
 use tactus_lab::eval::learn::learn;
 use tactus_lab::sim::collection::texture_name;
 
@@ -79,7 +77,7 @@ impl Pilot {
     pub const TEXTURES: u64 = PILOT_TEXTURES.len() as u64;
 
     /// Makes the slides of the pilot study, and looks for the most useful movements.
-    pub fn run(world: StudyWorld, done: impl Fn() + Sync) -> Result<Self, StudyError> {
+    pub fn run(world: StudyWorld, done: impl Fn() + Sync) -> anyhow::Result<Self> {
         let movements: Vec<Movement> = Movement::grid().collect();
         let session = Session {
             textures: &PILOT_TEXTURES,
@@ -93,7 +91,7 @@ impl Pilot {
     }
 
     /// The results of these trials.
-    pub fn of(movements: &[Movement], trials: &[TextureTrials]) -> Result<Self, StudyError> {
+    pub fn of(movements: &[Movement], trials: &[TextureTrials]) -> anyhow::Result<Self> {
         let missed = |movement: usize| {
             let of = |t: &TextureTrials| {
                 let missed = t.not_reached.iter().find(|m| m.movement == movement)?;
@@ -146,16 +144,15 @@ fn uncertainty(
     movements: &[Movement],
     reached: &[usize],
     trials: &[TextureTrials],
-) -> Result<Vec<[f32; 3]>, StudyError> {
+) -> anyhow::Result<Vec<[f32; 3]>> {
     let names = trials.iter().map(|t| texture_name(t.texture).to_owned());
     let slides = |t: &TextureTrials| reached.iter().map(|&m| t.slides[m].clone()).collect();
     let slides: Vec<Vec<_>> = trials.iter().map(slides).collect();
     let names: Vec<String> = names.collect();
     let made: Vec<Movement> = reached.iter().map(|&m| movements[m]).collect();
     let bytes = learn(Method::Paper, None, &names, &made, &slides)?;
-    let table = Table::read(&bytes).map_err(EvaluateError::from)?;
-    let explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())
-        .map_err(EvaluateError::from)?;
+    let table = Table::read(&bytes)?;
+    let explorer = Explorer::<128>::new(table, PropertySet::ALL, Config::default())?;
     let mut left = vec![[1.0; 3]; movements.len()];
     for outcome in explorer.expected_outcomes() {
         let movement = reached.get(usize::from(outcome.action.movement));

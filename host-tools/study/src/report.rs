@@ -2,9 +2,11 @@
 //!
 //! The words of the page are in its template, `report/page.html`.
 
-use std::path::{Path, PathBuf};
-use std::{fs, io};
+use std::fs;
+use std::io;
+use std::path::Path;
 
+use anyhow::{Context as _, Result, anyhow, ensure};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use tactus_core::features::Property;
@@ -13,7 +15,7 @@ use tactus_lab::eval::evaluate::Method;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::matrix::{SHADES, matrix};
-use crate::chart::{COLOURS, DrawError, Figure};
+use crate::chart::{COLOURS, Figure};
 use crate::identify::{Column, Identification, METHODS, PairRow, of_pair, pairs_mean, short_name};
 use crate::page::render;
 use crate::pilot::{MostUseful, Pilot, PilotMovement};
@@ -48,61 +50,35 @@ pub struct Study {
     pub identification: Option<Identification>,
 }
 
-/// Reasons why a report cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The folder has something in it.
-    #[error("{}: is not empty; give --out a new folder, so that no study is mixed with another", .0.display())]
-    Taken(PathBuf),
-    /// Another study is under way there.
-    #[error("{}: another study is written there now; give --out a new folder", .0.display())]
-    Busy(PathBuf),
-    /// The system could not write.
-    #[error("{} cannot be written; give --out a folder that can be written", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// A figure failed.
-    #[error(transparent)]
-    Draw(#[from] DrawError),
-    /// The study does not become JSON.
-    #[error("the study cannot be written as JSON; please report this")]
-    Json(#[from] serde_json::Error),
-    /// The page's template fails.
-    #[error("the template of the report's page fails; please report this")]
-    Page(#[from] minijinja::Error),
-}
-
 /// The lock in a folder whose study is not whole.
 const LOCK: &str = "INCOMPLETE.lock";
 
 /// Makes the folder of a report, or takes an empty one, or one that a study was killed in; it is this study's until the
 /// lock is dropped. Called before the work, which takes minutes.
-///
-/// # Errors
-/// See [`ReportError`].
-pub fn prepare(folder: &Path) -> Result<Lock, ReportError> {
-    let error = |source| ReportError::Io {
-        path: folder.to_owned(),
-        source,
-    };
-    fs::create_dir_all(folder).map_err(error)?;
+pub fn prepare(folder: &Path) -> Result<Lock> {
+    let shown = folder.display();
+    let unwritable =
+        || format!("{shown} cannot be written; give --out a folder that can be written");
+    fs::create_dir_all(folder).with_context(unwritable)?;
     let lock = folder.join(LOCK);
-    let is_taken = fs::read_dir(folder).map_err(error)?.next().is_some();
-    if is_taken && !lock.is_file() {
-        return Err(ReportError::Taken(folder.to_owned()));
-    }
-    Lock::take(&lock).map_err(|source| match source.kind() {
-        io::ErrorKind::ResourceBusy => ReportError::Busy(folder.to_owned()),
-        _ => error(source),
+    let is_taken = fs::read_dir(folder)
+        .with_context(unwritable)?
+        .next()
+        .is_some();
+    ensure!(
+        !is_taken || lock.is_file(),
+        "{shown}: is not empty; give --out a new folder, so that no study is mixed with another"
+    );
+    Lock::take(&lock).map_err(|why| match why.kind() {
+        io::ErrorKind::ResourceBusy => {
+            anyhow!("{shown}: another study is written there now; give --out a new folder")
+        }
+        _ => anyhow!(why).context(unwritable()),
     })
 }
 
 /// Writes everything of a study into its folder, the page last; or nothing, where that fails.
-pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
+pub fn write(study: &Study, folder: &Path) -> Result<()> {
     let (json, page) = (
         json(study)?,
         render(include_str!("report/page.html"), &contents(study)?)?,
@@ -116,19 +92,22 @@ pub fn write(study: &Study, folder: &Path) -> Result<(), ReportError> {
     let files: Vec<(&str, &[u8])> = tables.chain(rest).collect();
     for (name, bytes) in &files {
         let path = folder.join(name);
-        if let Err(source) = write_whole(&path, bytes) {
+        if let Err(why) = write_whole(&path, bytes) {
             for (name, _) in &files {
                 // those that were written
                 let _ = fs::remove_file(folder.join(name));
             }
-            return Err(ReportError::Io { path, source });
+            let path = path.display();
+            let unwritable =
+                format!("{path} cannot be written; give --out a folder that can be written");
+            return Err(anyhow!(why).context(unwritable));
         }
     }
     Ok(())
 }
 
 /// study.json.
-pub fn json(study: &Study) -> Result<String, ReportError> {
+pub fn json(study: &Study) -> Result<String> {
     Ok(serde_json::to_string(study)? + "\n")
 }
 
@@ -166,7 +145,7 @@ impl Contents {
     }
 }
 
-fn contents(study: &Study) -> Result<Contents, DrawError> {
+fn contents(study: &Study) -> Result<Contents> {
     let mut all = Contents::default();
     let about = json!({
         "version": study.version,
@@ -202,7 +181,7 @@ fn movement_name((force_n, speed_mm_s): (f32, f32)) -> String {
 }
 
 /// The most useful movements, and fig. 7.
-fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<(), DrawError> {
+fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<()> {
     let useful = |m: &MostUseful| {
         let left = |at: usize| pilot.movements[at].uncertainty[m.property.index()];
         let name = |at: usize| movement_name(pilot.movements[at].at());
@@ -246,7 +225,7 @@ fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<(), DrawError> {
 }
 
 /// Uncertainty by force and speed: the least is framed, movements that wear the skin are grey.
-fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
+fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure> {
     let property = useful.property;
     let left = |m: &PilotMovement| f64::from(m.uncertainty[property.index()]);
     let reached = |m: &&PilotMovement| m.not_reached.is_empty();
@@ -292,7 +271,7 @@ fn fig7(pilot: &Pilot, useful: &MostUseful) -> Result<Figure, DrawError> {
 }
 
 /// Table 3, and the geometric means of fig. 9.
-fn training(training: &Training, all: &mut Contents) -> Result<(), DrawError> {
+fn training(training: &Training, all: &mut Contents) -> Result<()> {
     let mut rows = Vec::new();
     for (c, &movement) in training.correlations.iter().zip(&training.movements) {
         for ((a, b), paper) in [(0, 1), (0, 2), (1, 2)].into_iter().zip(c.paper) {

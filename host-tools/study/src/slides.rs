@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use anyhow::Context as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::dsp::Plan;
@@ -14,7 +15,6 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::slide_path::SlidePath;
 
-use super::error::StudyError;
 use super::published::{IDENTIFIED, TRIALS};
 use tactus_lab::sim::collection::{
     Collection, Next, Trial, calibrated, record_trials, texture_name,
@@ -89,10 +89,11 @@ impl StudyWorld {
     }
 
     /// The calibration that the rigs of this world share.
-    pub fn calibration(self) -> Result<RigCalibration, StudyError> {
-        let world = self.seed;
-        calibrated(self.collection().setup(1, 0))
-            .map_err(|source| StudyError::Calibration { world, source })
+    pub fn calibration(self) -> anyhow::Result<RigCalibration> {
+        calibrated(self.collection().setup(1, 0)).with_context(|| {
+            let world = self.seed;
+            format!("world {world}: the simulated rig cannot be calibrated; another --seed makes another world")
+        })
     }
 
     /// Makes all slides of a session, textures side by side; `done` is called after each texture. Errors: The first
@@ -102,7 +103,7 @@ impl StudyWorld {
         session: &Session<'_>,
         calibration: RigCalibration,
         done: impl Fn() + Sync,
-    ) -> Result<Vec<TextureTrials>, StudyError> {
+    ) -> anyhow::Result<Vec<TextureTrials>> {
         let plan = Plan::new();
         self.skins(session)
             .into_par_iter()
@@ -121,7 +122,7 @@ impl StudyWorld {
         wear: f64,
         calibration: RigCalibration,
         plan: &Plan,
-    ) -> Result<TextureTrials, StudyError> {
+    ) -> anyhow::Result<TextureTrials> {
         let Session {
             movements, trials, ..
         } = *session;
@@ -230,7 +231,7 @@ impl StudyWorld {
     pub const RECORDED: u64 = 117 + IDENTIFIED.len() as u64;
 
     /// Makes the slides of training and validation; `done` is called after each texture.
-    pub fn train_and_validate(self, done: impl Fn() + Sync) -> Result<Recorded, StudyError> {
+    pub fn train_and_validate(self, done: impl Fn() + Sync) -> anyhow::Result<Recorded> {
         let calibration = self.calibration()?;
         let all: Vec<u8> = (1..=117).collect();
         let session = |textures, number| Session {

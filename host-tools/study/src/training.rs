@@ -5,10 +5,8 @@ use tactus_core::explorer::{Method, confusion};
 use tactus_core::features::Property;
 use tactus_core::table::{Action, Gaussian, Table};
 
-use super::error::StudyError;
 use super::published::{CORRELATIONS, MOST_USEFUL};
 use super::slides::{Named, TextureTrials, properties};
-use tactus_lab::eval::evaluate::EvaluateError;
 use tactus_lab::eval::learn::learn;
 use tactus_lab::sim::collection::{Collection, texture_name};
 
@@ -79,7 +77,7 @@ pub struct TableFile {
 
 impl Training {
     /// The results of these trials.
-    pub fn of(trials: &[TextureTrials]) -> Result<Self, StudyError> {
+    pub fn of(trials: &[TextureTrials]) -> anyhow::Result<Self> {
         let movements = Collection::MOVEMENTS;
         let names: Vec<String> = trials
             .iter()
@@ -92,15 +90,15 @@ impl Training {
         ]
         .map(|(file, method)| {
             let data = learn(method, None, &names, &movements, &slides)?;
-            let table = Table::read(&data).map_err(EvaluateError::from)?;
-            Ok::<_, StudyError>(TableFile {
+            let table = Table::read(&data)?;
+            anyhow::Ok(TableFile {
                 file: file.to_owned(),
                 crc: format!("{:08x}", table.crc()),
                 data,
             })
         });
         let tables = vec![gaussians?, fused?];
-        let table = Table::read(&tables[0].data).map_err(EvaluateError::from)?;
+        let table = Table::read(&tables[0].data)?;
         let gaussian = |texture: usize, movement: usize, property| {
             let action = Action {
                 movement: movement as u8,

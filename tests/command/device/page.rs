@@ -236,7 +236,7 @@ fn a_page_teaches_verifies_trains_and_records() {
     let moved = manifest
         .lines()
         .skip(1)
-        .map(|row| row.rsplit(',').nth(4).unwrap());
+        .map(|row| row.rsplit(',').nth(7).unwrap());
     assert!(moved.eq(["no"; 4]), "{manifest}");
 }
 

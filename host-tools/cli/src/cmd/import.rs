@@ -103,8 +103,11 @@ fn signals(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         return Ok(());
     };
     let bar = progress(survey.slides() as u64, "writing slides");
-    survey.write(to, &|done, _| bar.set_position(done as u64))?;
+    let left_out = survey.write(to, &|done, _| bar.set_position(done as u64))?;
     bar.finish_and_clear();
+    for slide in left_out {
+        writeln!(out, "left out: {slide}")?;
+    }
     writeln!(out, "{}: written", to.display())?;
     Ok(())
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::ValueEnum;
-use tactus_study::StudyError;
 use tactus_study::identify::{
     Column, Identification, METHODS, experiment, of_pair, pairs, pairs_mean, short_name,
 };
@@ -81,7 +80,7 @@ fn variation(text: &str) -> Result<f64, String> {
 fn stage<T>(
     what: String,
     length: u64,
-    work: impl FnOnce(&(dyn Fn() + Sync)) -> Result<T, StudyError>,
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
     with_progress(length, what.clone(), work).context(what)
 }

@@ -53,7 +53,8 @@ impl SlideChecks {
         let seconds = |samples: usize, rate_hz: u32| samples as f64 / f64::from(rate_hz);
         let lasts = seconds(pac.len(), PAC_RATE_HZ);
         let shear = slide.shear_mn().map(|mn| (mn.len(), slide.shear_rate_hz));
-        let pdc = Some((slide.pdc.len(), slide.pdc_rate_hz));
+        // without samples it was not measured
+        let pdc = Some((slide.pdc.len(), slide.pdc_rate_hz)).filter(|(samples, _)| *samples > 0);
         for (stream, of) in [("P_DC", pdc), ("shear", shear)] {
             let Some((samples, rate_hz)) = of else {
                 continue;

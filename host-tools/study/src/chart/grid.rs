@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::labels::{lines, width};
-use super::svg::{COLOURS, DrawError, EM, Figure, From, GREY, Tip, WIDTH, caption, figure, write};
+use super::svg::{COLOURS, EM, Figure, From, GREY, Tip, WIDTH, caption, figure, write};
 
 /// A cell of a [`Grid`].
 pub(crate) struct Tile {
@@ -36,7 +36,7 @@ const LINE: i32 = 18;
 const TALL: i32 = 270;
 
 impl Grid<'_> {
-    pub(crate) fn figure(self) -> Result<Figure, DrawError> {
+    pub(crate) fn figure(self) -> anyhow::Result<Figure> {
         let (columns, rows) = (&self.x.1, &self.y.1);
         let longest = |names: &[String]| names.iter().map(|n| width(n, EM)).max().unwrap_or(0);
         let left = 28 + longest(rows);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::svg::{DrawError, Figure, WIDTH, figure};
+use super::svg::{Figure, WIDTH, figure};
 use super::{Chart, Series};
 
 /// Lower ends of the shades of a [`matrix`]: lower degrees are white.
@@ -16,7 +16,7 @@ pub(crate) fn matrix(
     told: &str,
     axis: &str,
     of: &[Vec<f32>],
-) -> Result<Figure, DrawError> {
+) -> anyhow::Result<Figure> {
     let n = of.len() as f64;
     let chart = Chart {
         y_range: (n + 0.5, 0.5),

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::io;
 
+use anyhow::Context as _;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -48,14 +49,6 @@ const FITS: &str = "style=\"max-width:100%;height:auto\"";
 pub(super) type Failed = DrawingAreaErrorKind<io::Error>;
 pub(super) type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// A figure was not drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("the figure \"{figure}\" cannot be drawn; please report this")]
-pub struct DrawError {
-    figure: String,
-    source: Failed,
-}
-
 /// A figure, or a panel of one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Figure {
@@ -80,17 +73,15 @@ pub(super) fn figure(
     about: &str,
     size: (u32, u32),
     draw: impl FnOnce(&Root<'_>) -> Result<Vec<Tip>, Failed>,
-) -> Result<Figure, DrawError> {
+) -> anyhow::Result<Figure> {
     let mut drawing = String::new();
     let drawn = {
         let root = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
         let drawn = root.fill(&WHITE).and_then(|()| draw(&root));
         drawn.and_then(|tips| root.present().map(|()| tips))
     };
-    let tips = drawn.map_err(|source| DrawError {
-        figure: title.to_owned(),
-        source,
-    })?;
+    let tips = drawn
+        .with_context(|| format!("the figure \"{title}\" cannot be drawn; please report this"))?;
     let mut says = format!("<title>{}</title>\n", escaped(title));
     if !about.is_empty() {
         let _ = writeln!(says, "<desc>{}</desc>", escaped(about));

@@ -1,6 +1,6 @@
 //! A control chart: the distance of each reading from the mean of its part and operator, in the order of time.
 
-use crate::chart::{COLOURS, Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
+use crate::chart::{COLOURS, Chart, Figure, MARKS, Mark, Series, WIDTH};
 use tactus_lab::eval::gauge::{Reading, Study, distinct};
 
 /// Height of the chart without its words, px.
@@ -13,7 +13,7 @@ pub fn figure(
     unit: &str,
     readings: &[Reading],
     study: &Study,
-) -> Result<Figure, DrawError> {
+) -> anyhow::Result<Figure> {
     let places = || (1..).map(f64::from).zip(study.away.iter().copied());
     let operators = distinct(readings.iter().map(|r| r.operator.as_str()));
     let end = readings.len() as f64 + 1.0;

@@ -3,7 +3,7 @@
 use tactus_core::explorer::VerdictKind;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
-use crate::chart::{COLOURS, DrawError, Figure};
+use crate::chart::{COLOURS, Figure};
 use tactus_lab::eval::courses::Course;
 use tactus_lab::eval::reliability::verdicts;
 
@@ -11,11 +11,7 @@ use tactus_lab::eval::reliability::verdicts;
 const FEW: usize = 12;
 
 /// Verdicts of these explorations at this threshold, row by row: presented textures, and columns of verdicts.
-pub fn confusion(
-    courses: &[Course],
-    names: &[String],
-    threshold: f32,
-) -> Result<Figure, DrawError> {
+pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow::Result<Figure> {
     let known = names.len();
     let mut counts = vec![vec![0_u64; known + 3]; known];
     for course in courses {

@@ -6,7 +6,7 @@ use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Table};
 use tactus_core::wire::Event;
 
-use crate::chart::{Chart, DrawError, Figure, MARKS, Series};
+use crate::chart::{Chart, Figure, MARKS, Series};
 
 /// Textures that were never more probable than this have no line of their own.
 const LIKELY: f32 = 0.05;
@@ -62,7 +62,7 @@ impl<'t> Exploration<'t> {
     }
 
     /// Its picture; none, if no slide counted.
-    pub fn figures(&self, threshold: f32) -> Result<Vec<Figure>, DrawError> {
+    pub fn figures(&self, threshold: f32) -> anyhow::Result<Vec<Figure>> {
         match self.slides.is_empty() {
             true => Ok(Vec::new()),
             false => Ok(vec![self.posterior(threshold)?]),
@@ -78,7 +78,7 @@ impl<'t> Exploration<'t> {
         best
     }
 
-    fn posterior(&self, threshold: f32) -> Result<Figure, DrawError> {
+    fn posterior(&self, threshold: f32) -> anyhow::Result<Figure> {
         let slides = self.slides.len() as f64;
         let prior = 1.0 / f64::from(self.table.textures().max(1));
         let of = |texture: u16| {

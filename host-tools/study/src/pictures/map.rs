@@ -2,14 +2,14 @@
 
 use tactus_core::table::Table;
 
-use crate::chart::{Chart, DrawError, Figure, MARKS, Series, WIDTH, buffer};
+use crate::chart::{Chart, Figure, MARKS, Series, WIDTH, buffer};
 use tactus_lab::eval::places::{Plane, distances, off};
 
 /// More textures than this have numbers in the map and a list of names below it.
 const NAMED: usize = 40;
 
 /// The map of a table's textures.
-pub fn figure(table: Table<'_>) -> Result<Figure, DrawError> {
+pub fn figure(table: Table<'_>) -> anyhow::Result<Figure> {
     let distances = distances(table, None);
     let names: Vec<&str> = table.names().collect();
     let places = Plane::of(&distances).places;

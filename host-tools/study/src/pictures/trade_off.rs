@@ -1,6 +1,6 @@
 //! Picture of `tactus evaluate --verify`: false rejects against false accepts, limit by limit.
 
-use crate::chart::{Chart, DrawError, Figure, MARKS, Mark, Series, WIDTH};
+use crate::chart::{Chart, Figure, MARKS, Mark, Series, WIDTH};
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verify::After;
 
@@ -8,7 +8,7 @@ use tactus_lab::eval::verify::After;
 const TALL: u32 = 380;
 
 /// The curves after one slide, two, three.
-pub fn figure(after: &[After]) -> Result<Figure, DrawError> {
+pub fn figure(after: &[After]) -> anyhow::Result<Figure> {
     let percent = |share: f64| 100.0 * share;
     let worst = after.iter().map(|a| percent(a.equal_error));
     let end = (4.0 * worst.fold(0.5, f64::max)).ceil();

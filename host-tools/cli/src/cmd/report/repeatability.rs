@@ -9,7 +9,7 @@ use tactus_core::features::{Movement, Property};
 use tactus_lab::data::recording::Labels;
 use tactus_lab::eval::gauge::{Reading, Study, distinct, study};
 use tactus_lab::eval::show::count;
-use tactus_study::chart::{DrawError, Figure};
+use tactus_study::chart::Figure;
 use tactus_study::pictures::control;
 
 use crate::cmd::output::{Format, UsageError, percent, print_json};
@@ -82,7 +82,7 @@ pub(super) fn run(
     Ok(())
 }
 
-fn charts(gauged: &Gauged) -> Result<Vec<Figure>, DrawError> {
+fn charts(gauged: &Gauged) -> anyhow::Result<Vec<Figure>> {
     let mut figures = Vec::new();
     for (at, movement) in (1..).zip(&gauged.movements) {
         for gauge in &movement.properties {

@@ -8,38 +8,26 @@ use rayon::prelude::*;
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
-use super::cut::{Parts, parts};
-use super::resample::{RATES_HZ, resample};
-use super::settings::{Named, SETTINGS, Settings, guessed, matched};
+use super::cut::Parts;
+use super::resample::RATES_HZ;
+use super::settings::{SETTINGS, Settings};
 use super::signals::Signals;
+use crate::data::quality::SlideChecks;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
 
-/// Deepest folder below the one that is imported.
-const DEPTH: usize = 8;
-/// Most files of one import.
-const MOST_FILES: usize = 100_000;
-/// Endings of files that are data; others are left alone.
-const ENDINGS: [&str; 6] = ["wav", "csv", "tsv", "txt", "npy", "dat"];
+mod paths;
+mod reading;
+
+use paths::files;
+use reading::{How, liveliest, rounded};
+
 /// Largest value that the samples are made to have: 12 bits with a little room.
 const FULL: f64 = 2000.0;
-/// Names of columns of time.
-const TIMES: [&str; 7] = [
-    "time",
-    "t",
-    "timestamp",
-    "seconds",
-    "sec",
-    "elapsed",
-    "zeit",
-];
 /// P_AC before the window, so that the filter has filled, in samples.
 const BEFORE: usize = 220;
 /// Longest still part that is kept, in samples.
 const STILL: usize = 2200;
-/// Samples of the slides into which longer sliding is divided: 3 s, and what a slow sensor can have in 20 s.
-const LENGTH: usize = 6600;
-const SLOW_LENGTH: usize = 2000;
 /// Rate of P_DC and of shear in what is written, Hz.
 const SLOW_HZ: u32 = 100;
 /// Width of a picture of a file, in characters.
@@ -185,9 +173,10 @@ impl Survey {
         settings
     }
 
-    /// Writes the recordings into a folder that is not there yet; `progress` gets the slides done, and of all.
+    /// Writes the recordings into a folder that is not there yet; `progress` gets the slides done, and of all. Returns the
+    /// slides that were left out, and why: those of a dead sensor, copies.
     /// Errors: A file cannot be read again, or not be written.
-    pub fn write(&self, to: &Path, progress: &dyn Fn(usize, usize)) -> Result<()> {
+    pub fn write(&self, to: &Path, progress: &dyn Fn(usize, usize)) -> Result<Vec<String>> {
         let textures = (1..).zip(&self.textures).map(|(id, name)| Texture {
             id,
             name: name.clone(),
@@ -198,8 +187,9 @@ impl Survey {
             true => self.from.as_path(),
             false => self.from.parent().unwrap_or(&self.from),
         };
-        let mut numbers = vec![0; self.textures.len()];
-        let mut done = 0;
+        let mut numbers = vec![0_u32; self.textures.len()];
+        let mut checks: Vec<SlideChecks> = numbers.iter().map(|_| SlideChecks::default()).collect();
+        let mut left_out = Vec::new();
         // the parts of a file lie next to each other
         for parts in self.found.chunk_by(|a, b| a.path == b.path) {
             let path = folder.join(&parts[0].path);
@@ -222,23 +212,27 @@ impl Survey {
                 let pdc = slow(&self.settings.pressure, self.pressure_gain)?;
                 let shear = slow(&self.settings.shear, Some(1e3))?;
                 for range in &found.ranges.slides {
-                    numbers[texture] += 1;
                     let slide =
                         self.slide(&pac, range, &found.ranges, pdc.as_deref(), shear.as_deref());
-                    let slide = slide.map_err(at)?;
-                    writer.write(&Recording {
+                    let slide = Recording {
                         texture,
-                        number: numbers[texture],
-                        ..slide
-                    })?;
-                    done += 1;
-                    progress(done, self.slides());
+                        number: numbers[texture] + 1,
+                        ..slide.map_err(at)?
+                    };
+                    if let Err(why) = checks[texture].check(&slide) {
+                        left_out.push(format!("{}: {why}", found.path));
+                        continue;
+                    }
+                    numbers[texture] += 1;
+                    writer.write(&slide)?;
+                    progress(numbers.iter().sum::<u32>() as usize, self.slides());
                 }
             }
         }
         fs::write(to.join(SETTINGS), self.settings().template())
             .map_err(|why| RecordingError::at(&to.join(SETTINGS), why))?;
-        writer.finish()
+        writer.finish()?;
+        Ok(left_out)
     }
 }
 
@@ -277,7 +271,9 @@ impl Survey {
         let still = parts
             .still
             .clone()
-            .map(|still| still.start..still.end.min(still.start + STILL));
+            .map(|still| &pac[still.start..still.end.min(still.start + STILL)]);
+        // a converter that is switched on late is no background
+        let still = still.filter(|still| still.iter().any(|x| *x != still[0]));
         let slide = Recording {
             texture: 0,
             number: 0,
@@ -301,406 +297,11 @@ impl Survey {
                 }
             },
         };
-        let still = still.map(|still| &pac[still]).unwrap_or_default();
         let shear = shear.map(slow);
-        slide.cut(still, &pac[start..range.end], shear.as_deref())
+        slide.cut(
+            still.unwrap_or_default(),
+            &pac[start..range.end],
+            shear.as_deref(),
+        )
     }
-}
-
-/// How the samples of a file are read.
-struct How {
-    rate_hz: f64,
-    /// the rate that the signal is resampled from; `None` where a sample stays a sample
-    from_hz: Option<u32>,
-}
-
-impl How {
-    fn new(signals: &Signals, settings: &Settings) -> std::result::Result<Self, String> {
-        let timed = time(signals, settings)?
-            .map(|(_, times)| rate_of(&times))
-            .transpose()?;
-        let rate = settings
-            .rate
-            .or(signals.rate_hz)
-            .or(timed.map(|(rate, _)| rate));
-        let Some(rate_hz) = rate else {
-            let columns: Vec<&str> = signals
-                .channels
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
-            return Err(format!(
-                "no rate: give --rate HZ, or --time COLUMN; the columns of numbers are {}",
-                columns.join(", ")
-            ));
-        };
-        if !(1.0..=*RATES_HZ.end()).contains(&rate_hz) {
-            return Err(format!(
-                "a rate of {rate_hz} Hz; it is 1 to {} Hz. Is the time in s? Its column's name may say ms or us",
-                RATES_HZ.end()
-            ));
-        }
-        let from_hz = RATES_HZ
-            .contains(&rate_hz)
-            .then_some(rate_hz.round() as u32);
-        Ok(Self { rate_hz, from_hz })
-    }
-
-    fn look(
-        &self,
-        path: &str,
-        named: &Named,
-        signals: &Signals,
-        channel: &str,
-        settings: &Settings,
-    ) -> std::result::Result<Vec<Found>, String> {
-        let own = Self::new(signals, settings)?;
-        if (own.rate_hz / self.rate_hz - 1.0).abs() > 0.02 {
-            return Err(format!(
-                "{:.1} Hz, and the first file has {:.1} Hz: import files of one kind at a time, chosen by --texture \
-                 \"{{texture}}/*_imu.csv\" and the like",
-                own.rate_hz, self.rate_hz
-            ));
-        }
-        let (_, all) = signals.channel(channel).ok_or_else(|| {
-            let names: Vec<&str> = signals
-                .channels
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
-            format!("no channel {channel:?}; there are {}", names.join(", "))
-        })?;
-        let gaps = match time(signals, settings)? {
-            Some((_, times)) => rate_of(&times)?.1,
-            None => Vec::new(),
-        };
-        let column = settings
-            .texture
-            .as_ref()
-            .filter(|t| !t.contains(['{', '*']));
-        let words = match column {
-            None => None,
-            Some(column) => {
-                let words = signals.words.iter().find(|(name, _)| name == column);
-                Some(words.ok_or_else(|| format!("no column of words {column:?}"))?)
-            }
-        };
-        let stretches: Vec<(String, Range<usize>)> = match words {
-            None => vec![(named.texture.clone(), 0..all.len())],
-            Some((_, words)) => {
-                let mut at = 0;
-                let runs = words.chunk_by(|a, b| a == b).map(|run| {
-                    at += run.len();
-                    (run[0].clone(), at - run.len()..at)
-                });
-                runs.filter(|(word, _)| !word.is_empty()).collect()
-            }
-        };
-        let length = match (settings.length, self.from_hz) {
-            (Some(seconds), _) => (seconds * self.out_hz()) as usize,
-            (None, Some(_)) => LENGTH,
-            (None, None) => SLOW_LENGTH,
-        };
-        let window = settings.window()?;
-        let found = stretches.into_iter().map(|(texture, rows)| {
-            let out = self.resampled(&all[rows.clone()]);
-            let mut ranges = match window {
-                Some((from, to)) => {
-                    let at = |s: f64| ((s * self.out_hz()) as usize).min(out.len());
-                    let still = (at(from) >= STILL / 2).then_some(0..at(from));
-                    Parts {
-                        slides: Vec::from_iter(Some(at(from)..at(to))),
-                        still,
-                    }
-                }
-                None => parts(&out, length.max(1), LEAST),
-            };
-            ranges.slides.retain(|range| range.len() >= LEAST);
-            let there = ranges.slides.len();
-            let scale = out.len() as f64 / rows.len() as f64;
-            let whole = |range: &Range<usize>| {
-                !gaps
-                    .iter()
-                    .filter_map(|gap| gap.checked_sub(rows.start))
-                    .any(|gap| range.contains(&((gap as f64 * scale) as usize)))
-            };
-            ranges.slides.retain(whole);
-            let peak = out.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-            let pressure = settings.pressure.as_ref().map(|column| {
-                let (_, values) = signals
-                    .channel(column)
-                    .ok_or_else(|| format!("no column {column:?}"))?;
-                let values = &values[rows.clone()];
-                let (low, high) = values
-                    .iter()
-                    .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
-                Ok::<_, String>(if high > low {
-                    low.abs().max(high.abs())
-                } else {
-                    0.0
-                })
-            });
-            let part = |at: usize| at as f32 / out.len() as f32;
-            Ok(Found {
-                path: path.to_owned(),
-                texture,
-                session: settings
-                    .session
-                    .clone()
-                    .unwrap_or_else(|| named.session.clone()),
-                seconds: rows.len() as f64 / self.rate_hz,
-                envelope: envelope(&out),
-                slides: ranges
-                    .slides
-                    .iter()
-                    .map(|r| (part(r.start), part(r.end)))
-                    .collect(),
-                gaps: there - ranges.slides.len(),
-                still: ranges.still.is_some(),
-                rows,
-                ranges,
-                peak,
-                pressure: pressure.transpose()?.unwrap_or(0.0),
-            })
-        });
-        found.collect()
-    }
-
-    /// Seconds of the sensor's clock in one of 2200 Hz.
-    fn stretch(&self) -> f64 {
-        match self.from_hz {
-            Some(_) => 1.0,
-            None => f64::from(PAC_RATE_HZ) / self.rate_hz,
-        }
-    }
-
-    /// Samples of P_AC per second of the sensor's clock.
-    fn out_hz(&self) -> f64 {
-        f64::from(PAC_RATE_HZ) / self.stretch()
-    }
-
-    /// The signal about its mean, at 2200 Hz.
-    fn resampled(&self, samples: &[f64]) -> Vec<f64> {
-        let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
-        let about: Vec<f64> = samples.iter().map(|x| x - mean).collect();
-        match self.from_hz {
-            Some(from_hz) => resample(&about, from_hz, PAC_RATE_HZ),
-            None => about,
-        }
-    }
-
-    fn pac(&self, signals: &Signals, channel: &str, rows: Range<usize>, gain: f64) -> Vec<i16> {
-        let all = signals.channel(channel).map_or(&[][..], |(_, all)| all);
-        let out = self.resampled(all.get(rows).unwrap_or_default());
-        // `as` saturates
-        out.into_iter().map(|x| (x * gain).round() as i16).collect()
-    }
-
-    /// A slow column at [`SLOW_HZ`] of the resampled clock: the mean of what falls between two of its samples.
-    fn slow(
-        &self,
-        signals: &Signals,
-        column: &str,
-        found: &Found,
-        gain: f64,
-    ) -> std::result::Result<Vec<i16>, String> {
-        let (_, all) = signals
-            .channel(column)
-            .ok_or_else(|| format!("no column {column:?}"))?;
-        let values = all.get(found.rows.clone()).unwrap_or_default();
-        let each = self.rate_hz * self.stretch() / f64::from(SLOW_HZ);
-        let samples = (values.len() as f64 / each).ceil() as usize;
-        let at = |n: usize| ((n as f64 * each) as usize).min(values.len() - 1);
-        let mean = |n: usize| {
-            let some = &values[at(n)..at(n + 1).max(at(n) + 1)];
-            some.iter().sum::<f64>() / some.len() as f64
-        };
-        Ok((0..samples)
-            .map(|n| (mean(n) * gain).round() as i16)
-            .collect())
-    }
-}
-
-/// Fewest samples of a slide: spectra of some frames.
-const LEAST: usize = 1100;
-
-/// The file's column of time, in s.
-fn time(
-    signals: &Signals,
-    settings: &Settings,
-) -> std::result::Result<Option<(String, Vec<f64>)>, String> {
-    let is_time = |name: &str| {
-        let name = name.to_lowercase();
-        let word = name.split(['_', ' ', '(', '[']).next().unwrap_or_default();
-        TIMES.contains(&word)
-    };
-    let column = match &settings.time {
-        Some(time) => Some(
-            signals
-                .channel(time)
-                .ok_or_else(|| format!("no column {time:?}"))?,
-        ),
-        None => signals.channels.iter().find(|(name, _)| is_time(name)),
-    };
-    Ok(column.map(|(name, values)| {
-        let lower = name.to_lowercase();
-        let has = |unit: &str| {
-            lower
-                .split(|c: char| !c.is_alphanumeric())
-                .any(|part| part == unit)
-        };
-        let unit = match () {
-            () if has("ns") => 1e-9,
-            () if has("us") || has("µs") => 1e-6,
-            () if has("ms") => 1e-3,
-            () => 1.0,
-        };
-        (name.clone(), values.iter().map(|t| t * unit).collect())
-    }))
-}
-
-/// Samples per second by their times, and before which of them some are missing.
-fn rate_of(times: &[f64]) -> std::result::Result<(f64, Vec<usize>), String> {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let gaps = steps.clone();
-    steps.sort_by(f64::total_cmp);
-    let middle = steps[steps.len() / 2];
-    if middle <= 0.0 {
-        return Err("its time does not go on; give --rate HZ instead".to_owned());
-    }
-    // samples that came in bursts have the right mean, and the median of a clock that jumps is not moved by it
-    let usual: Vec<f64> = gaps
-        .iter()
-        .copied()
-        .filter(|s| (0.0..3.0 * middle).contains(s))
-        .collect();
-    let mean = usual.iter().sum::<f64>() / usual.len() as f64;
-    let jumps = gaps
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| !(0.0..=3.0 * middle).contains(*s));
-    Ok((1.0 / mean, jumps.map(|(at, _)| at + 1).collect()))
-}
-
-/// The channel that changes most from sample to sample, in parts of its range.
-fn liveliest(signals: &Signals, settings: &Settings) -> std::result::Result<String, String> {
-    let time = time(signals, settings)?.map(|(name, _)| name);
-    let slow = [&time, &settings.pressure, &settings.shear];
-    let others = signals
-        .channels
-        .iter()
-        .filter(|(name, _)| !slow.contains(&&Some(name.clone())));
-    let energy = |samples: &[f64]| {
-        samples
-            .windows(2)
-            .map(|p| (p[1] - p[0]).powi(2))
-            .sum::<f64>()
-    };
-    let best = others.max_by(|(_, a), (_, b)| energy(a).total_cmp(&energy(b)));
-    best.map(|(name, _)| name.clone())
-        .ok_or_else(|| "no column of numbers beside the time".to_owned())
-}
-
-/// Two digits, rounded down.
-fn rounded(gain: f64) -> f64 {
-    let scale = 10_f64.powf(gain.log10().floor() - 1.0);
-    (gain / scale).floor() * scale
-}
-
-fn envelope(out: &[f64]) -> Vec<f32> {
-    let each = out.len().div_ceil(WIDTH).max(1);
-    let powers: Vec<f64> = out
-        .chunks(each)
-        .map(|part| (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).sqrt())
-        .collect();
-    let most = powers.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    powers
-        .into_iter()
-        .map(|power| (power / most) as f32)
-        .collect()
-}
-
-/// The files to import, by their paths below the folder, and what these say, in their natural order.
-fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Named)>> {
-    let mut paths = Vec::new();
-    if from.is_dir() {
-        walk(from, "", 0, &mut paths)?;
-    } else {
-        let name = from
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        paths.extend(name);
-    }
-    paths.sort_by_cached_key(|path| natural(path));
-    let pattern = settings
-        .texture
-        .as_ref()
-        .filter(|texture| texture.contains(['{', '*']));
-    let named = paths.into_iter().filter_map(|path| {
-        let named = match pattern {
-            Some(pattern) => matched(pattern, &path)?,
-            None => guessed(&path),
-        };
-        Some((path, named))
-    });
-    let named: Vec<_> = named.collect();
-    if named.is_empty() {
-        let why = match pattern {
-            Some(pattern) => format!("no path in it is like {pattern:?}"),
-            None => format!("no file in it ends with {}", ENDINGS.join(", ")),
-        };
-        return Err(RecordingError::at(from, why));
-    }
-    Ok(named)
-}
-
-fn walk(folder: &Path, below: &str, depth: usize, paths: &mut Vec<String>) -> Result<()> {
-    let fault = |why: std::io::Error| RecordingError::at(folder, why);
-    for entry in fs::read_dir(folder).map_err(fault)? {
-        let entry = entry.map_err(fault)?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name.starts_with('.') {
-            continue;
-        }
-        let path = format!("{below}{name}");
-        // of the entry itself: links that lead elsewhere are left alone
-        let kind = entry.file_type().map_err(fault)?;
-        if kind.is_dir() && depth < DEPTH {
-            walk(&entry.path(), &format!("{path}/"), depth + 1, paths)?;
-        } else if kind.is_file() {
-            let plain = name.strip_suffix(".gz").unwrap_or(&name).to_lowercase();
-            if plain
-                .rsplit_once('.')
-                .is_some_and(|(_, end)| ENDINGS.contains(&end))
-            {
-                paths.push(path);
-            }
-        }
-        if paths.len() > MOST_FILES {
-            return Err(RecordingError::at(
-                folder,
-                format!("more than {MOST_FILES} files; import a part"),
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// A key by which `run10` comes after `run9`.
-fn natural(path: &str) -> Vec<(String, u64)> {
-    let mut key = Vec::new();
-    let mut rest = path;
-    while !rest.is_empty() {
-        let digits = rest
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
-        let (word, after) = rest.split_at(digits);
-        let end = after
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(after.len());
-        let (number, after) = after.split_at(end);
-        key.push((word.to_owned(), number.parse().unwrap_or(u64::MAX)));
-        rest = after;
-    }
-    key
 }
