@@ -139,3 +139,23 @@ assert n == int(sys.argv[2]), n";
     let ran = python(PROGRAM).unwrap();
     assert!(ran.status.success(), "{ran:?}");
 }
+
+#[test]
+fn samples_that_a_log_lacks_are_named_where_they_are_missing() {
+    let at = Scratch::new();
+    let log = at.log("identify");
+    let told = |file: &str| -> usize {
+        at.printed(&format!("convert identify.jsonl --mcap {file}"));
+        let log = messages(&at.read(file)).remove("/log").unwrap_or_default();
+        let missing = log.iter().filter(|(_, message)| {
+            let said = message["message"].as_str().unwrap();
+            said.contains("samples before this are missing")
+        });
+        missing.count()
+    };
+    assert_eq!(told("whole"), 0);
+    let is_block = |line: &&str| line.contains("\"Block\":{\"number\":10,");
+    let lost = log.lines().find(is_block).unwrap();
+    at.write("identify.jsonl", log.replace(&format!("{lost}\n"), ""));
+    assert_eq!(told("gap"), 1);
+}

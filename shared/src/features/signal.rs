@@ -43,7 +43,8 @@ impl Extreme {
 pub struct Signal {
     samples: u32,
     last: Option<i16>,
-    /// Samples in a row that are equal, or beyond where an end of the range may be, on one side: a vibration comes back.
+    /// Samples in a row that are equal, or as far out as an end of the range may be, on one side: a vibration comes
+    /// back.
     stands: u16,
     hangs: bool,
     low: Extreme,

@@ -93,8 +93,8 @@ faults! {
     SensorErrors, "sensor link bad", "23 damaged words within a second: half a percent", 2, BOTH, ALL,
         "check cable length, ground and clock phase, then reset";
     /// The sensor repeats the same word.
-    SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise, or at an end of its range", 102, BOTH, ALL,
-        "switch the probe and its sensor off and on";
+    SensorFrozen, "sensor frozen", "P_AC the same for 100 ms, which always has noise, or at an end of its range", 102,
+        BOTH, ALL, "switch the probe and its sensor off and on";
     /// Samples of a slide are missing.
     SlideGap, "gap in a slide", "a damaged or late word between the background and the end of the slide", 2,
         "nothing: the slide is finished", "the slide: it is repeated", "none";

@@ -241,6 +241,8 @@ struct Converted {
     table: Vec<u8>,
     /// when the next sample of this kind is, still or not: P_AC, shear
     next: Option<(bool, u64, u64)>,
+    /// number of the block that comes next
+    number: u16,
     failed: anyhow::Result<()>,
 }
 
@@ -253,6 +255,7 @@ impl Converted {
             names: Vec::new(),
             table: Vec::new(),
             next: None,
+            number: 0,
             failed: Ok(()),
         })
     }
@@ -373,8 +376,14 @@ impl Converted {
         // and after what came before it, however late that was
         let over = self.next.map_or(0, |(_, pac, _)| pac);
         let begun = self.now_ns.saturating_sub(length).max(over);
+        let follows = block.number > 0 && block.number == self.number;
+        if block.lost > 0 || block.number > 0 && !follows {
+            let why = "samples before this are missing: the slide does not count";
+            self.to.log(self.now_ns, WARNING, why)?;
+        }
+        self.number = block.number.wrapping_add(1);
         let (pac, shear) = match self.next {
-            Some((still, pac, shear)) if still == block.still && block.number > 0 => (pac, shear),
+            Some((still, pac, shear)) if still == block.still && follows => (pac, shear),
             _ => {
                 let steady = block.steady.map_or(0, |(from, _)| from);
                 let steady = u64::from(steady) * 1_000_000_000 / u64::from(PAC_RATE_HZ);

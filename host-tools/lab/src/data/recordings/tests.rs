@@ -463,3 +463,63 @@ fn labels_come_back_and_may_be_missing() {
         [Labels::default(), Labels::default()]
     );
 }
+
+#[test]
+fn many_rows_and_names_are_read_in_little_time() {
+    let folder = TempDir::new().unwrap();
+    let mut manifest = own::COLUMNS.join(",");
+    let mut table = "texture,movement,trial,set,traction,roughness,fineness".to_owned();
+    for row in 0..400_000 {
+        let (texture, slide, set) = (
+            row % 100_000,
+            row / 100_000,
+            ["train", "validate"][row / 300_000],
+        );
+        let speed_um_s = 5000 + row % 100_000;
+        manifest += &format!(
+            "\n{texture},name {texture},{slide},0.5,{}e-3,0,1,2,,,{row}.npy,2200,a,{row}.npy,2200,b,,1000,",
+            speed_um_s
+        );
+        table += &format!("\nname {texture},1,{slide},{set},1,2,3");
+    }
+    fs::write(folder.path().join(OWN_MANIFEST), manifest).unwrap();
+    let file = folder.path().join("table.csv");
+    fs::write(&file, table).unwrap();
+    let begun = std::time::Instant::now();
+    let set = RecordingSet::open(folder.path()).unwrap();
+    assert_eq!(
+        (set.textures().len(), set.movements().len()),
+        (100_000, 100_000)
+    );
+    let table = crate::data::properties::PropertyTable::read(&file).unwrap();
+    assert_eq!(
+        (table.textures.len(), table.train[99_999][0].len()),
+        (100_000, 3)
+    );
+    assert!(begun.elapsed().as_secs() < 10, "{:?}", begun.elapsed());
+}
+
+#[test]
+fn what_is_in_memory_at_once_is_bounded_and_stays_in_its_order() {
+    use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
+    let (now, most) = (AtomicU64::new(0), AtomicU64::new(0));
+    let work = |item: &u64| {
+        most.fetch_max(now.fetch_add(*item, SeqCst) + item, SeqCst);
+        std::thread::sleep(std::time::Duration::from_millis(2));
+        now.fetch_sub(*item, SeqCst);
+        Ok::<_, ()>(*item)
+    };
+    let mut items: Vec<u64> = (0..40).map(|n| (n % 5 * 50) << 20).collect();
+    assert_eq!(
+        each_in_flight(&items, |item| *item, work).as_ref(),
+        Ok(&items)
+    );
+    assert!((200 << 20..=IN_FLIGHT).contains(&most.load(SeqCst)));
+    // one that is more than the limit comes alone
+    items[7] = 400 << 20;
+    assert_eq!(
+        each_in_flight(&items, |item| *item, work).as_ref(),
+        Ok(&items)
+    );
+    assert_eq!(most.into_inner(), 400 << 20);
+}
