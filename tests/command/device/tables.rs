@@ -68,6 +68,33 @@ fn a_table_is_checked_pushed_and_pulled() {
         assert!(!bench.asked().iter().any(changes), "{line}");
         assert_eq!(bench.at.read("kept"), other);
     }
+    // no file of a user is in the way of a copy, and a copy can be read again; else nothing is changed
+    bench.at.write("mine", "mine");
+    for (line, why) in [
+        ("forget --name a --yes --backup mine", "--force"),
+        (
+            "table factory --yes --backup /dev/null",
+            "another file with --backup",
+        ),
+        ("table factory --yes --backup -", "name a file"),
+        ("table factory --yes --backup no/such/kept", "no/such/kept"),
+        ("table pull mine", "--force"),
+    ] {
+        assert_says(&bench.error(line), &[why]);
+        assert!(!bench.asked().iter().any(changes), "{line}");
+        assert_eq!(bench.at.read("mine"), b"mine");
+    }
+    // of its own name, by the SHA-256 of its bytes, there is one copy of one table
+    let hash = tactus_lab::data::recordings::files::sha256(&other);
+    let said = bench.error("table factory");
+    let name = format!("tactus/backups/table-{hash}.tact");
+    assert_says(&said, &["nothing was changed"]);
+    let copy = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    assert_eq!(fs::read(&copy).unwrap(), other);
+    fs::write(&copy, "damaged").unwrap();
+    assert_says(&bench.error("table factory --yes"), &["is there already"]);
+    assert!(!bench.asked().iter().any(changes));
+    fs::remove_file(&copy).unwrap();
     let said = bench.printed("table factory --yes --backup kept");
     assert_says(
         &said,

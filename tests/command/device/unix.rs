@@ -164,6 +164,62 @@ fn a_serial_port_opens_and_a_busy_one_is_an_error() {
     assert_says(&status, &[&name, "3 textures", "0 frames damaged"]);
 }
 
+/// A terminal that is closed without a signal, as of a program in the background: its end is not read for ever.
+#[test]
+fn a_monitor_whose_terminal_or_probe_is_gone_ends() {
+    let bench = Bench::new(20);
+    let ends = |mut child: Child| {
+        let until = Instant::now() + Duration::from_secs(40);
+        loop {
+            if let Some(ended) = child.try_wait().unwrap() {
+                return ended.code();
+            }
+            if Instant::now() > until {
+                child.kill().unwrap();
+                panic!("it goes on");
+            }
+            thread::sleep(Duration::from_millis(50));
+        }
+    };
+    let monitor = |at: &Scratch| {
+        let (inherited, slave) = TTYPort::pair().unwrap();
+        let name = slave.name().unwrap();
+        // a copy is closed in the command, which would hold its own terminal open
+        let master = inherited.try_clone_native().unwrap();
+        drop(inherited);
+        let open = || {
+            let mut options = std::fs::OpenOptions::new();
+            options.read(true).write(true).open(&name).unwrap()
+        };
+        let mut command = at.command("device monitor --port PORT");
+        command.stdin(open()).stdout(open()).stderr(open());
+        (command.spawn().unwrap(), master)
+    };
+    for ms in [0, 37, 111] {
+        bench.asked();
+        let (child, master) = monitor(&bench.at);
+        bench.wait_for(|command| *command == wire::Command::Stream(true));
+        thread::sleep(Duration::from_millis(ms));
+        drop(master);
+        assert!(matches!(ends(child), Some(1 | 130)), "{ms}");
+    }
+    // the cable is pulled
+    let wait = Some(Duration::from_millis(1));
+    let vanishing = line(move |stream| {
+        let (asked, told) = mpsc::channel();
+        stream.set_read_timeout(wait).unwrap();
+        let cable = stream.try_clone().unwrap();
+        thread::spawn(move || {
+            while !matches!(told.recv(), Ok(wire::Command::Stream(true)) | Err(_)) {}
+            let _ = cable.shutdown(Shutdown::Both);
+        });
+        serve(once(stream), 10, asked);
+    });
+    let (child, master) = monitor(&Scratch::new().with("PORT", vanishing));
+    assert_eq!(ends(child), Some(1));
+    drop(master);
+}
+
 /// A terminal that ends with the test.
 struct Tmux(String);
 

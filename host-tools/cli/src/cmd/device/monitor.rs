@@ -89,7 +89,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     // whatever happens, a panic too, the terminal is given back as it was
     let mut terminal = ratatui::try_init()?;
     let ended = watch(&mut bench, &mut monitor, &mut terminal, &wanted);
-    // it may be gone
+    // it may be gone; its drop would tell that on standard error, and panic where that is gone, too
+    if terminal.show_cursor().is_err() {
+        std::mem::forget(terminal);
+    }
     let _ = ratatui::try_restore();
     let end = match ended {
         Ok(end) => end,
