@@ -24,8 +24,8 @@
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it, and
 //! symbolic links do not lead out; each is a one-dimensional array of `<i2` (numpy.int16) of 262144 samples at most.
-//! The hash is the SHA-256 of the whole file in hexadecimal, or empty. The rows may come in any order; textures are taken in the
-//! order of their first row. Texts hold no character that does not print.
+//! The hash is the SHA-256 of the whole file in hexadecimal, or empty. The rows may come in any order; textures are
+//! taken in the order of their first row. Texts hold no character that does not print.
 //!
 //! All streams of a slide cover the same time. A slide is refused, and `tactus import` leaves it out, where P_AC does
 //! not change for 100 ms, stands at an end of the converter's range, has more than a quarter of its samples there,
