@@ -8,9 +8,9 @@
 //! | 2, 3 | 16 | settings: calibration, skin care, progress of the training, what the probe has learned by itself |
 //! | 4, 5 | 64, 128 | one texture table each that is longer than fits into 0 and 1, of 64 KB at most |
 //!
-//! Of all tables that are committed and whole the newest is in use. A new one takes none of the slots of the newest two,
-//! so that the one before it stays until it is whole; but of two large ones it takes the older one's, if it is large, too.
-//! Nothing is erased before the header of a table has come.
+//! Of all tables that are committed and whole the newest is in use. A new one takes none of the slots of the newest
+//! two, so that the one before it stays until it is whole; but of two large ones it takes the older one's, if it is
+//! large, too. Nothing is erased before the header of a table has come.
 //!
 //! A cut at any moment, in the middle of a word or of an erase as well, leaves the state before an operation or the one
 //! after it. So does a future that is dropped before its end; the store must then be opened anew.

@@ -81,8 +81,8 @@ impl Slot {
 pub(super) struct Push {
     pub(super) slot: Slot,
     pub(super) length: usize,
-    /// Bytes taken; those of an unfinished word are in `word`, and all of them in `header` as long as they are less than
-    /// a header. Nothing is erased before that is a table's.
+    /// Bytes taken; those of an unfinished word are in `word`, and all of them in `header` as long as they are less
+    /// than a header. Nothing is erased before that is a table's.
     pub(super) at: usize,
     pub(super) word: [u8; WORD],
     pub(super) header: [u8; table::HEADER],

@@ -102,8 +102,8 @@ pub enum MemoryError {
     #[error("the stored table cannot be read, and the one stored before it is in its place: {0}")]
     NewestTable(TableError),
     #[error(
-        "the probe was reset while it read its stored table, and that of the firmware is in its place: push a table, or \
-         go back to the firmware's"
+        "the probe was reset while it read its stored table, and that of the firmware is in its place: push a table, \
+         or go back to the firmware's"
     )]
     Unread,
 }
