@@ -327,8 +327,8 @@ fn a_gauge_study_compares_operators_of_several_folders() {
     }
     // the same slides by two operators: nobody reads more than the other
     for name in ["Anna", "Ben"] {
-        at.recordings(name, |line| match line.strip_suffix(",,,,biotac,,,1") {
-            Some(line) => Some(format!("{line},{name},,,biotac,,,1")),
+        at.recordings(name, |line| match line.strip_suffix(",,,,biotac,,,1,,,") {
+            Some(line) => Some(format!("{line},{name},,,biotac,,,1,,,")),
             None => Some(line.to_owned()),
         });
     }
@@ -411,7 +411,7 @@ fn a_table_says_whether_the_samples_of_its_slides_were_moved() {
     let learned = |labels: &dyn Fn(&str, u32) -> &'static str| {
         at.recordings("slides", |line| {
             // nobody said so far, nor of which finger and at what speed
-            let line = line.rsplitn(6, ',').last()?;
+            let line = line.rsplitn(9, ',').last()?;
             let fields: Vec<&str> = line.split(',').collect();
             let slide = fields[2].parse();
             let moved = slide.map_or("moved", |slide| labels(fields[1], slide));

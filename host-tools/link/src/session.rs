@@ -1,7 +1,7 @@
 //! Turns requests into frames and received bytes into reports; the errors of a transaction.
 
 use tactus_core::rig::calibration::RigCalibrationError;
-use tactus_core::table::{MAX_TEXTURES, TableError};
+use tactus_core::table::TableError;
 use tactus_core::wire::{
     self, Command, Event, Failure, FrameError, MAX_FRAME, PROTOCOL, Receiver, Report, Reset,
     TooLong,
@@ -76,9 +76,6 @@ pub enum LinkError {
     /// No table, or one that the probe does not hold.
     #[error("this is no table for the probe")]
     Table(#[from] TableError),
-    /// More textures than the probe holds.
-    #[error("the table's textures are {0}, the probe holds {MAX_TEXTURES}: learn fewer")]
-    Textures(u16),
     /// The table in use became another one while it was read.
     #[error("the table was changed while it was read: read it again")]
     Changed,

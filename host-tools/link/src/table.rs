@@ -1,6 +1,6 @@
 //! Texture tables on their way to the probe, and from it.
 
-use tactus_core::table::{MAX_TEXTURES, Table, TableError};
+use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{Command, Event, PART};
 
 use super::session::{LinkError, MAX_TRIES};
@@ -20,9 +20,6 @@ impl PushTable {
     /// The table at the beginning of `bytes`, checked.
     pub fn new(bytes: &[u8]) -> Result<Self, LinkError> {
         let table = Table::read(bytes)?;
-        if usize::from(table.textures()) > MAX_TEXTURES {
-            return Err(LinkError::Textures(table.textures()));
-        }
         Ok(Self {
             bytes: table.as_bytes().to_vec(),
             next: 0,

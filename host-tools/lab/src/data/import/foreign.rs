@@ -1,5 +1,6 @@
 //! Anybody's files as recordings: looked at once, to find what they do not say, and written in the project's format.
 
+use std::collections::HashMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -112,42 +113,15 @@ impl Survey {
         });
         let found: Vec<Vec<Found>> = looked.collect::<Result<_>>()?;
         let found: Vec<Found> = found.into_iter().flatten().collect();
-        let peak = found.iter().map(|f| f.peak).fold(0.0, f64::max);
-        let pressure = found.iter().map(|f| f.pressure).fold(0.0, f64::max);
-        if peak == 0.0 {
-            return Err(at(format!(
-                "channel {channel:?} never changes: is the sensor connected?"
-            )));
-        }
-        let gain = match (settings.gain, settings.unit.as_deref()) {
-            (Some(gain), _) if gain.is_finite() && gain > 0.0 => gain,
-            (Some(gain), _) => return Err(at(format!("a gain of {gain} is impossible"))),
-            (None, Some("counts")) => 1.0,
-            (None, _) => rounded(FULL / peak),
-        };
-        let mut textures: Vec<String> = Vec::new();
-        let mut seen = std::collections::HashSet::new();
-        for f in &found {
-            if seen.insert(f.texture.as_str()) {
-                textures.push(f.texture.clone());
-            }
-        }
-        let empty = textures.iter().find(|texture| {
-            let mut of = found.iter().filter(|f| f.texture == **texture);
-            of.all(|f| f.ranges.slides.is_empty())
-        });
-        if let Some(texture) = empty {
-            return Err(at(format!(
-                "no sliding was found in the files of {texture}; say where it is by --window FROM,TO, or move them away"
-            )));
-        }
+        let (gain, pressure) = gains(&found, &channel, &settings).map_err(at)?;
+        let textures = textures(&found).map_err(at)?;
         Ok(Self {
             found,
             rate_hz: how.rate_hz,
             channel,
             gain,
             kind: first.kind,
-            pressure_gain: (pressure > 0.0).then(|| rounded(FULL / pressure)),
+            pressure_gain: pressure,
             textures,
             from: from.to_owned(),
             settings,
@@ -303,5 +277,48 @@ impl Survey {
             &pac[start..range.end],
             shear.as_deref(),
         )
+    }
+}
+
+/// Counts per unit of the vibration, and of the pressure where it changes.
+fn gains(
+    found: &[Found],
+    channel: &str,
+    settings: &Settings,
+) -> std::result::Result<(f64, Option<f64>), String> {
+    let peak = found.iter().map(|f| f.peak).fold(0.0, f64::max);
+    let pressure = found.iter().map(|f| f.pressure).fold(0.0, f64::max);
+    if peak == 0.0 {
+        return Err(format!(
+            "channel {channel:?} never changes: is the sensor connected?"
+        ));
+    }
+    let gain = match (settings.gain, settings.unit.as_deref()) {
+        (Some(gain), _) if gain.is_finite() && gain > 0.0 => gain,
+        (Some(gain), _) => return Err(format!("a gain of {gain} is impossible")),
+        (None, Some("counts")) => 1.0,
+        (None, _) => rounded(FULL / peak),
+    };
+    Ok((gain, (pressure > 0.0).then(|| rounded(FULL / pressure))))
+}
+
+/// The textures in the order of their first file; each has a slide.
+fn textures(found: &[Found]) -> std::result::Result<Vec<String>, String> {
+    let (mut textures, mut slides) = (Vec::new(), HashMap::new());
+    for f in found {
+        let of = slides.entry(f.texture.as_str()).or_insert_with(|| {
+            textures.push(f.texture.clone());
+            0
+        });
+        *of += f.ranges.slides.len();
+    }
+    match textures
+        .iter()
+        .find(|texture| slides[texture.as_str()] == 0)
+    {
+        Some(texture) => Err(format!(
+            "no sliding was found in the files of {texture}; say where it is by --window FROM,TO, or move them away"
+        )),
+        None => Ok(textures),
     }
 }

@@ -156,20 +156,7 @@ fn table(bytes: &[u8]) -> std::result::Result<Signals, String> {
         .ok()
         .filter(|text| !text.contains('\0'))
         .ok_or("none of WAV, .npy, or a table in UTF-8 text (CSV, TSV); save it as one of them")?;
-    let is_row = |line: &&str| !line.is_empty() && !line.starts_with(['#', '%']);
-    let mut rows = text.lines().map(str::trim).filter(is_row).peekable();
-    let first = *rows.peek().ok_or("an empty file")?;
-    let second = text
-        .lines()
-        .map(str::trim)
-        .filter(is_row)
-        .nth(1)
-        .unwrap_or(first);
-    let mark = *MARKS
-        .iter()
-        .find(|mark| second.as_bytes().contains(mark))
-        .unwrap_or(&b',');
-    let decimal_comma = mark != b',' && !second.contains('.') && second.contains(',');
+    let (mark, decimal_comma) = marks(text).ok_or("an empty file")?;
     let number = |field: &str| -> Option<f64> {
         let field = field.trim();
         match decimal_comma {
@@ -236,7 +223,21 @@ fn table(bytes: &[u8]) -> std::result::Result<Signals, String> {
     columns_of(names, columns)
 }
 
-/// Sorts columns into times, numbers and words.
+/// The mark between the columns of a text, and whether numbers have a decimal comma, by its second row.
+fn marks(text: &str) -> Option<(u8, bool)> {
+    let is_row = |line: &&str| !line.is_empty() && !line.starts_with(['#', '%']);
+    let mut rows = text.lines().map(str::trim).filter(is_row);
+    let first = rows.next()?;
+    let row = rows.next().unwrap_or(first);
+    let mark = MARKS.iter().find(|mark| row.as_bytes().contains(mark));
+    let mark = *mark.unwrap_or(&b',');
+    Some((
+        mark,
+        mark != b',' && !row.contains('.') && row.contains(','),
+    ))
+}
+
+/// Sorts columns into numbers and words.
 fn columns_of(
     names: Vec<String>,
     columns: Vec<Vec<(Option<f64>, String)>>,

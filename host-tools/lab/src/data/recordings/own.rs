@@ -227,49 +227,11 @@ impl Entry {
             }
         };
         let pac = Stream::of(row, "pac_file", "pac_sha256")?;
-        let [lot, operator, note, session, run] = ["lot", "operator", "note", "session", "run"]
-            .map(|column| row.shown(column).map(str::to_owned));
-        let [finger, calibrated, pace, highest] =
-            ["finger", "calibrated", "pace", "highest_hz"].map(|name| row.text(name));
-        let code = match finger {
-            "" => FingerCode::BIOTAC,
-            name => name.parse().unwrap_or(FingerCode::OTHER),
-        };
-        if code == FingerCode::OTHER {
-            valid_name(finger).map_err(|why| row.error(Some("finger"), why))?;
-        }
-        let moved = match row.text("moved") {
-            "" => None,
-            "yes" => Some(true),
-            "no" => Some(false),
-            other => {
-                let other: String = other.chars().take(40).collect();
-                let cause = format!("{other:?} is not yes, no or nothing");
-                return Err(row.error(Some("moved"), cause));
-            }
-        };
         Ok(Self {
             line: row.line(),
             number: row.parse("slide", "the number of a slide")?,
             movement,
-            labels: Labels {
-                lot: lot?,
-                operator: operator?,
-                note: note?,
-                moved,
-                session: session?,
-                run: run?,
-                sensor: if code == FingerCode::OTHER {
-                    finger.to_owned()
-                } else {
-                    String::new()
-                },
-                finger: code,
-                calibrated: match calibrated {
-                    "" => 0,
-                    _ => row.parse("calibrated", "a day as 20261121")?,
-                },
-            },
+            labels: labels(row)?,
             window: (row.number("window_start_s")?, row.number("window_end_s")?),
             background,
             pac: pac.ok_or_else(|| row.error(Some("pac_file"), "no file is named"))?,
@@ -277,11 +239,11 @@ impl Entry {
             pdc_rate_hz: rate("pdc_rate_hz")?,
             shear: Stream::of(row, "shear_file", "shear_sha256")?,
             shear_rate_hz: rate("shear_rate_hz")?,
-            pace: match pace {
+            pace: match row.text("pace") {
                 "" => None,
                 _ => Some(row.parse("pace", "a whole number of 1/1024")?),
             },
-            highest_hz: match highest {
+            highest_hz: match row.text("highest_hz") {
                 "" => None,
                 _ => Some(row.number("highest_hz")?),
             },
@@ -316,6 +278,48 @@ impl Entry {
             RecordingError::at(&folder.join(MANIFEST), cause)
         })
     }
+}
+
+/// What a row says of its sample, its session and its sensor.
+fn labels(row: &Row<'_>) -> Result<Labels> {
+    let [lot, operator, note, session, run] = ["lot", "operator", "note", "session", "run"]
+        .map(|column| row.shown(column).map(str::to_owned));
+    let finger = row.text("finger");
+    let code = match finger {
+        "" => FingerCode::BIOTAC,
+        name => name.parse().unwrap_or(FingerCode::OTHER),
+    };
+    if code == FingerCode::OTHER {
+        valid_name(finger).map_err(|why| row.error(Some("finger"), why))?;
+    }
+    let moved = match row.text("moved") {
+        "" => None,
+        "yes" => Some(true),
+        "no" => Some(false),
+        other => {
+            let other: String = other.chars().take(40).collect();
+            let cause = format!("{other:?} is not yes, no or nothing");
+            return Err(row.error(Some("moved"), cause));
+        }
+    };
+    Ok(Labels {
+        lot: lot?,
+        operator: operator?,
+        note: note?,
+        moved,
+        session: session?,
+        run: run?,
+        sensor: if code == FingerCode::OTHER {
+            finger.to_owned()
+        } else {
+            String::new()
+        },
+        finger: code,
+        calibrated: match row.text("calibrated") {
+            "" => 0,
+            _ => row.parse("calibrated", "a day as 20261121")?,
+        },
+    })
 }
 
 impl Stream {

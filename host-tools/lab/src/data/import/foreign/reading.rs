@@ -78,108 +78,65 @@ impl How {
                 own.rate_hz, self.rate_hz
             ));
         }
-        let (_, all) = signals.channel(channel).ok_or_else(|| {
-            let names: Vec<&str> = signals
-                .channels
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
-            format!("no channel {channel:?}; there are {}", names.join(", "))
-        })?;
+        let all = self::channel(signals, channel)?;
         let gaps = match time(signals, settings)? {
             Some((_, times)) => rate_of(&times)?.1,
             None => Vec::new(),
         };
-        let column = settings
-            .texture
-            .as_ref()
-            .filter(|t| !t.contains(['{', '*']));
-        let words = match column {
-            None => None,
-            Some(column) => {
-                let words = signals.words.iter().find(|(name, _)| name == column);
-                Some(words.ok_or_else(|| format!("no column of words {column:?}"))?)
-            }
-        };
-        let stretches: Vec<(String, Range<usize>)> = match words {
-            None => vec![(named.texture.clone(), 0..all.len())],
-            Some((_, words)) => {
-                let mut at = 0;
-                let runs = words.chunk_by(|a, b| a == b).map(|run| {
-                    at += run.len();
-                    (run[0].clone(), at - run.len()..at)
-                });
-                runs.filter(|(word, _)| !word.is_empty()).collect()
-            }
-        };
+        let stretches = stretches(signals, settings, named, all.len())?.into_iter();
+        let found = stretches.map(|(texture, rows)| {
+            let out = self.resampled(&all[rows.clone()]);
+            let mut ranges = self.ranges(&out, settings)?;
+            let there = ranges.slides.len();
+            let scale = out.len() as f64 / rows.len() as f64;
+            let inside = gaps.iter().filter_map(|gap| gap.checked_sub(rows.start));
+            let inside: Vec<usize> = inside.map(|gap| (gap as f64 * scale) as usize).collect();
+            ranges
+                .slides
+                .retain(|range| !inside.iter().any(|gap| range.contains(gap)));
+            let part = |at: usize| at as f32 / out.len() as f32;
+            let slides = ranges.slides.iter();
+            let session = settings.session.as_ref().unwrap_or(&named.session);
+            Ok(Found {
+                path: path.to_owned(),
+                texture,
+                session: session.clone(),
+                seconds: rows.len() as f64 / self.rate_hz,
+                envelope: envelope(&out),
+                slides: slides.map(|r| (part(r.start), part(r.end))).collect(),
+                gaps: there - ranges.slides.len(),
+                still: ranges.still.is_some(),
+                peak: out.iter().fold(0.0, |most: f64, x| most.max(x.abs())),
+                pressure: match &settings.pressure {
+                    Some(column) => span(&self::channel(signals, column)?[rows.clone()]),
+                    None => 0.0,
+                },
+                rows,
+                ranges,
+            })
+        });
+        found.collect()
+    }
+
+    /// Where the settings say that the finger slides, or where it seems to.
+    fn ranges(&self, out: &[f64], settings: &Settings) -> std::result::Result<Parts, String> {
         let length = match (settings.length, self.from_hz) {
             (Some(seconds), _) => (seconds * self.out_hz()) as usize,
             (None, Some(_)) => LENGTH,
             (None, None) => SLOW_LENGTH,
         };
-        let window = settings.window()?;
-        let found = stretches.into_iter().map(|(texture, rows)| {
-            let out = self.resampled(&all[rows.clone()]);
-            let mut ranges = match window {
-                Some((from, to)) => {
-                    let at = |s: f64| ((s * self.out_hz()) as usize).min(out.len());
-                    let still = (at(from) >= STILL / 2).then_some(0..at(from));
-                    Parts {
-                        slides: Vec::from_iter(Some(at(from)..at(to))),
-                        still,
-                    }
+        let mut ranges = match settings.window()? {
+            Some((from, to)) => {
+                let at = |s: f64| ((s * self.out_hz()) as usize).min(out.len());
+                Parts {
+                    slides: Vec::from_iter(Some(at(from)..at(to))),
+                    still: (at(from) >= STILL / 2).then_some(0..at(from)),
                 }
-                None => parts(&out, length.max(1), LEAST),
-            };
-            ranges.slides.retain(|range| range.len() >= LEAST);
-            let there = ranges.slides.len();
-            let scale = out.len() as f64 / rows.len() as f64;
-            let whole = |range: &Range<usize>| {
-                !gaps
-                    .iter()
-                    .filter_map(|gap| gap.checked_sub(rows.start))
-                    .any(|gap| range.contains(&((gap as f64 * scale) as usize)))
-            };
-            ranges.slides.retain(whole);
-            let peak = out.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-            let pressure = settings.pressure.as_ref().map(|column| {
-                let (_, values) = signals
-                    .channel(column)
-                    .ok_or_else(|| format!("no column {column:?}"))?;
-                let values = &values[rows.clone()];
-                let (low, high) = values
-                    .iter()
-                    .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
-                Ok::<_, String>(if high > low {
-                    low.abs().max(high.abs())
-                } else {
-                    0.0
-                })
-            });
-            let part = |at: usize| at as f32 / out.len() as f32;
-            Ok(Found {
-                path: path.to_owned(),
-                texture,
-                session: settings
-                    .session
-                    .clone()
-                    .unwrap_or_else(|| named.session.clone()),
-                seconds: rows.len() as f64 / self.rate_hz,
-                envelope: envelope(&out),
-                slides: ranges
-                    .slides
-                    .iter()
-                    .map(|r| (part(r.start), part(r.end)))
-                    .collect(),
-                gaps: there - ranges.slides.len(),
-                still: ranges.still.is_some(),
-                rows,
-                ranges,
-                peak,
-                pressure: pressure.transpose()?.unwrap_or(0.0),
-            })
-        });
-        found.collect()
+            }
+            None => parts(out, length.max(1), LEAST),
+        };
+        ranges.slides.retain(|range| range.len() >= LEAST);
+        Ok(ranges)
     }
 
     /// Seconds of the sensor's clock in one of 2200 Hz.
@@ -226,9 +183,7 @@ impl How {
         found: &Found,
         gain: f64,
     ) -> std::result::Result<Vec<i16>, String> {
-        let (_, all) = signals
-            .channel(column)
-            .ok_or_else(|| format!("no column {column:?}"))?;
+        let all = channel(signals, column)?;
         let values = all.get(found.rows.clone()).unwrap_or_default();
         let each = self.rate_hz * self.stretch() / f64::from(SLOW_HZ);
         let samples = (values.len() as f64 / each).ceil() as usize;
@@ -240,6 +195,53 @@ impl How {
         Ok((0..samples)
             .map(|n| (mean(n) * gain).round() as i16)
             .collect())
+    }
+}
+
+/// The samples of a channel.
+fn channel<'s>(signals: &'s Signals, wanted: &str) -> std::result::Result<&'s [f64], String> {
+    signals
+        .channel(wanted)
+        .map(|(_, samples)| samples.as_slice())
+        .ok_or_else(|| {
+            let names: Vec<&str> = signals
+                .channels
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .collect();
+            format!("no channel {wanted:?}; there are {}", names.join(", "))
+        })
+}
+
+/// The textures of a file: its own, or those that a column of words names, each with its rows.
+fn stretches(
+    signals: &Signals,
+    settings: &Settings,
+    named: &Named,
+    rows: usize,
+) -> std::result::Result<Vec<(String, Range<usize>)>, String> {
+    let column = settings.texture.as_ref();
+    let Some(column) = column.filter(|texture| !texture.contains(['{', '*'])) else {
+        return Ok(vec![(named.texture.clone(), 0..rows)]);
+    };
+    let words = signals.words.iter().find(|(name, _)| name == column);
+    let (_, words) = words.ok_or_else(|| format!("no column of words {column:?}"))?;
+    let mut at = 0;
+    let runs = words.chunk_by(|a, b| a == b).map(|run| {
+        at += run.len();
+        (run[0].clone(), at - run.len()..at)
+    });
+    Ok(runs.filter(|(word, _)| !word.is_empty()).collect())
+}
+
+/// The largest value of a signal that changes, else 0.
+fn span(values: &[f64]) -> f64 {
+    let ends = |(low, high): (f64, f64), x: &f64| (low.min(*x), high.max(*x));
+    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), ends);
+    if high > low {
+        low.abs().max(high.abs())
+    } else {
+        0.0
     }
 }
 
