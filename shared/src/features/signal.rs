@@ -1,5 +1,6 @@
 //! Checks that P_AC comes from a sensor that works: a signal that hangs or is cut off measures no texture.
 
+use super::block::BLOCK;
 use super::slide::SlideError;
 use crate::sensor::pressure::{Counts, RATE_HZ};
 
@@ -24,17 +25,31 @@ struct Extreme {
 }
 
 impl Extreme {
-    fn take(&mut self, sample: i16, is_beyond: bool) {
+    /// Takes samples of which this is the farthest out.
+    fn take(&mut self, farthest: i16, is_beyond: bool, samples: &[i16]) {
         if is_beyond {
-            self.value = sample;
+            self.value = farthest;
             self.samples = 0;
         }
-        self.samples += u32::from(sample == self.value);
+        if farthest == self.value {
+            let there = samples.iter().filter(|sample| **sample == farthest);
+            self.samples += there.count() as u32;
+        }
     }
 
     fn is_rail(self) -> bool {
-        i32::from(self.value).abs() >= LEAST_RAIL
+        is_far(self.value)
     }
+}
+
+fn is_far(sample: i16) -> bool {
+    i32::from(sample).abs() >= LEAST_RAIL
+}
+
+/// True if a sample shows no change since the one before: equal, or as far out on one side.
+fn stands(last: i16, sample: i16) -> bool {
+    let same_side = (last < 0) == (sample < 0);
+    last == sample || same_side && is_far(last) && is_far(sample)
 }
 
 /// P_AC as it comes, in counts about its rest. The ends of the range are where samples pile up: the rest, which differs
@@ -54,23 +69,38 @@ pub struct Signal {
 impl Signal {
     /// Takes the next samples.
     pub fn push(&mut self, samples: &[i16]) {
-        for &sample in samples {
-            let is_far = |sample: i16| i32::from(sample).abs() >= LEAST_RAIL;
-            let stands = self.last.is_some_and(|last| {
-                let same_side = (last < 0) == (sample < 0);
-                last == sample || same_side && is_far(last) && is_far(sample)
-            });
-            self.stands = if stands {
-                self.stands.saturating_add(1)
-            } else {
-                0
-            };
-            self.hangs |= self.stands >= FROZEN;
-            self.last = Some(sample);
-            self.low.take(sample, sample < self.low.value);
-            self.high.take(sample, sample > self.high.value);
+        // a run that is too long reaches over the ends of such a part: inside of it nothing needs to be counted
+        const { assert!(BLOCK < FROZEN as usize) };
+        for part in samples.chunks(BLOCK) {
+            let (low, high) = part
+                .iter()
+                .fold((i16::MAX, i16::MIN), |(low, high), sample| {
+                    (low.min(*sample), high.max(*sample))
+                });
+            self.low.take(low, low < self.low.value, part);
+            self.high.take(high, high > self.high.value, part);
+            self.count_standing(part);
+            self.last = part.last().copied();
         }
         self.samples = self.samples.saturating_add(samples.len() as u32);
+    }
+
+    fn count_standing(&mut self, part: &[i16]) {
+        let links = || part.iter().zip(part.iter().skip(1));
+        let first = self.last.iter().zip(part);
+        let begin = first.chain(links());
+        let begin = begin.take_while(|(last, sample)| stands(**last, **sample));
+        let begin = begin.count() as u16;
+        let joined = self.stands.saturating_add(begin);
+        self.hangs |= joined >= FROZEN;
+        let all = part.len() - usize::from(self.last.is_none());
+        self.stands = if usize::from(begin) == all {
+            joined
+        } else {
+            let end = links().rev();
+            let end = end.take_while(|(last, sample)| stands(**last, **sample));
+            end.count() as u16
+        };
     }
 
     /// Checks what has come; [`SlideError::Clipped`] is told of a signal with more than 1 % of its samples at the ends

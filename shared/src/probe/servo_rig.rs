@@ -286,8 +286,6 @@ impl<S: Servo> ServoRig<S> {
         self.rest().await.map(|_| ())
     }
 
-    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is
-    /// done.
     /// Waits until somebody presses the board's button and lets it go before that: high forces are not allowed over the
     /// line alone, where the board has a button. Errors: nobody does, or the probe is told to stop.
     async fn confirmed(&mut self) -> Result<(), Failure> {
@@ -309,6 +307,8 @@ impl<S: Servo> ServoRig<S> {
         Err(Failure::NotPressed)
     }
 
+    /// Lifts the finger, on which a person may press with so many mN, and waits until what they are asked to do is
+    /// done.
     async fn with_person(&mut self, mn: u16, asked: &mut PersonTask) -> Result<(), RigError> {
         if self.rest().await?.phase == Phase::Parked {
             self.home().await?;

@@ -86,7 +86,8 @@ impl Mounted<'_> {
 
     pub(super) fn speed(&mut self) -> Result<Finding, Trouble> {
         let mut places: Vec<(u32, Live)> = Vec::new();
-        let mut unloaded = false;
+        // a phase that goes on from the step before is not told again
+        let mut unloaded = true;
         let done = self
             .probe
             .ask(Command::Calibrate, &mut |report| match &report.event {

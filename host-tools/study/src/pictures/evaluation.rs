@@ -31,7 +31,6 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
         let all: u64 = counts[texture].iter().sum();
         let tile = |(column, &count): (usize, &u64)| {
             let share = count as f64 / all as f64;
-            let name = &names[texture];
             let (told, colour) = match column {
                 c if c == texture => ("told as sure, right".to_owned(), COLOURS[0]),
                 c if c == known => ("told to have changed".to_owned(), AVOIDED),
@@ -40,10 +39,9 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
                 c => (format!("told as sure to be {}", names[c]), COLOURS[1]),
             };
             Tile {
-                text: if count == 0 || known > FEW {
-                    String::new()
-                } else {
-                    format!("{:.0}", 100.0 * share)
+                text: match count == 0 || known > FEW {
+                    true => String::new(),
+                    false => format!("{:.0}", 100.0 * share),
                 },
                 // the least is to be seen, too
                 shade: if count == 0 { 0.0 } else { 0.15 + 0.85 * share },
@@ -52,7 +50,8 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
                 says: if count == 0 {
                     String::new()
                 } else {
-                    format!("{name}: {told}, {count} of {all} ({:.1} %)", 100.0 * share)
+                    let (name, percent) = (&names[texture], 100.0 * share);
+                    format!("{name}: {told}, {count} of {all} ({percent:.1} %)")
                 },
             }
         };
