@@ -397,13 +397,13 @@ test("a probe at a serial port: a line that is disturbed, and a plug that comes 
     await it.until("it is told", "/closed the port; open it again/.test(document.getElementById('u-problem').textContent)", 20);
     assert.equal(await text(it, "u-connect"), "Connect a probe");
     await press(it, "u-connect");
-    await it.until("it is connected again", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
+    await it.until("it is connected again", "tactus.usb()?.connected && !tactus.usb().busy", 30);
     await works();
   }
   await press(it, "u-connect");
   await it.until("it is left", "document.getElementById('u-connect').textContent === 'Connect a probe'");
   await press(it, "u-connect");
-  await it.until("it is connected once more", "tactus.usb()?.connected && !tactus.usb().busy", 30 * SLOW);
+  await it.until("it is connected once more", "tactus.usb()?.connected && !tactus.usb().busy", 30);
   await works();
 }));
 

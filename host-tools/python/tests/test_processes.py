@@ -168,8 +168,6 @@ def test_spawned_processes_get_slides(small, tmp_path):
 
 
 LONG = {
-    "a table that is a pipe": "tactus.Table.load(fifo)",
-    "a log that is a pipe": "tactus.read_log(fifo)",
     "an evaluation": "tactus.evaluate(recordings, train_slides=2, runs=10_000_000)",
     "a rig that another thread uses": "busy(rig)",
     "all textures of a world": "tactus.simulate(trials=1000)",

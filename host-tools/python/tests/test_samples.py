@@ -116,8 +116,12 @@ def test_numbers_that_no_rig_has_are_refused(small):
         with pytest.raises(tactus.SlideError):
             tactus.features(slide.pac, **{**good, **wrong})
     # the largest counts there are have features, and no overflow
-    loud = np.resize(np.array([-32768, 32767], "i2"), len(slide.pac))
+    loud = np.random.default_rng(1).integers(-32768, 32768, len(slide.pac)).astype("i2")
     assert np.isfinite(tactus.features(loud, **good).roughness_ln)
+    # one that only jumps from end to end is cut off
+    cut = np.resize(np.array([-32768, 32767], "i2"), len(slide.pac))
+    with pytest.raises(tactus.SlideError, match="cut off"):
+        tactus.features(cut, **good)
 
 
 def test_another_thread_may_write_to_the_samples(small):
