@@ -298,6 +298,7 @@ test("a probe at a serial port: names, settings, and the sample is moved between
   await asks("it asks", /^Move or turn Loden under the finger, so that the next slide is on another track\.$/);
   assert.equal(await text(it, "u-yes"), "It is moved");
   await press(it, "u-yes");
+  await it.until("it is noted", "document.getElementById('u-said').textContent.includes('moved between')", 150);
   await idle(it, "it is trained", 150);
   assert.match(await said(it), /Loden: 6 slides made\.[^]*Its sample was moved between trials\./);
   await set(it, "u-which", "Loden");
