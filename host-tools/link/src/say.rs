@@ -6,7 +6,7 @@ use tactus_core::features::Property;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::most_mn;
 use tactus_core::sensor::pressure::Calibration;
-use tactus_core::table::{Name, Table};
+use tactus_core::table::{Name, NameError, Table, valid_name};
 use tactus_core::wire::{Event, Forget, Phase, Prompt, Report, Status};
 
 use super::operations::Settings;
@@ -134,24 +134,21 @@ pub(crate) fn status_rows(
     rows
 }
 
-/// An error of a texture's name.
+/// A text that names no texture.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum NameError {
-    /// Nothing but spaces.
-    #[error("the name of the texture is empty: give one")]
-    Empty,
-    /// The probe keeps fewer bytes.
-    #[error("{0:?} is longer than the 40 bytes that the probe keeps: shorten it")]
-    Long(String),
+#[error("the name {name:?} {why}")]
+pub struct InvalidName {
+    name: String,
+    why: NameError,
 }
 
 /// The name of a texture as the probe keeps it.
-pub fn name_of(name: &str) -> Result<Name, NameError> {
+pub fn name_of(name: &str) -> Result<Name, InvalidName> {
     let name = name.trim();
-    if name.is_empty() {
-        return Err(NameError::Empty);
-    }
-    Name::try_from(name).map_err(|_| NameError::Long(name.to_owned()))
+    valid_name(name).map_err(|why| InvalidName {
+        name: name.to_owned(),
+        why,
+    })
 }
 
 /// The false alarms that the probe's limits are for.

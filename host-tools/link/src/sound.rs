@@ -1,6 +1,6 @@
 //! Reports that no probe makes: they pass the checksum, and nothing of them is believed or shown.
 
-use tactus_core::table::{MAX_MOVEMENTS, MAX_TEXTURES, is_false_alarm};
+use tactus_core::table::{self, MAX_MOVEMENTS, MAX_TEXTURES, is_false_alarm, valid_name};
 use tactus_core::wire::{Event, ExpectedOutcome, PART, SlideReport, Status, Verdict};
 
 /// Longest table, bytes: more than any chip has flash for.
@@ -47,7 +47,7 @@ pub(crate) fn impossible(event: &Event) -> Option<&'static str> {
                 .or_else(|| all(is_measured(observed), NUMBER))
         }
         Event::Verdict(verdict) => of_verdict(verdict),
-        Event::TextureLearned(learned) => all(is_name(&learned.name), TEXT),
+        Event::TextureLearned(learned) => all(valid_name(&learned.name).is_ok(), TEXT),
         Event::TrainingSlide {
             trial, observed, ..
         } => all(*trial > 0, COUNT).or_else(|| all(is_measured(observed), NUMBER)),
@@ -72,7 +72,7 @@ pub(crate) fn impossible(event: &Event) -> Option<&'static str> {
     }
 }
 
-pub(crate) const TEXT: &str = "a text with characters that do not print";
+const TEXT: &str = "a text with characters that do not print";
 const COUNT: &str = "a count out of its range";
 const DAY: &str = "a day of no calendar";
 const NUMBER: &str = "a number out of its range";
@@ -97,7 +97,7 @@ fn of_status(status: &Status) -> Option<&'static str> {
 fn of_verdict(verdict: &Verdict) -> Option<&'static str> {
     if !is_share(verdict.probability) {
         Some(PROBABILITY)
-    } else if !is_name(&verdict.name) {
+    } else if valid_name(&verdict.name).is_err() {
         Some(TEXT)
     } else if usize::from(verdict.texture) >= MAX_TEXTURES {
         Some(COUNT)
@@ -118,22 +118,7 @@ fn is_measured(observed: &SlideReport) -> bool {
         && observed.background >= 0.0
 }
 
-fn is_name(name: &str) -> bool {
-    !name.trim().is_empty() && is_printable(name)
-}
-
 /// Returns true if no character of a text controls a terminal, or the order of those around it.
-pub(crate) fn is_printable(text: &str) -> bool {
-    let hides = |c: char| {
-        let marks = '\u{200b}'..='\u{200f}';
-        let orders = '\u{2028}'..='\u{202e}';
-        let isolates = '\u{2060}'..='\u{2069}';
-        c.is_control()
-            || c == '\u{61c}'
-            || c == '\u{feff}'
-            || [marks, orders, isolates]
-                .iter()
-                .any(|range| range.contains(&c))
-    };
-    !text.chars().any(hides)
+fn is_printable(text: &str) -> bool {
+    text.chars().all(table::is_printable)
 }

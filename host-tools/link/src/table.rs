@@ -4,7 +4,6 @@ use tactus_core::table::{Table, TableError};
 use tactus_core::wire::{Command, Event, PART};
 
 use super::session::{LinkError, MAX_TRIES};
-use super::sound::{TEXT, is_printable};
 use super::transaction::Transaction;
 
 /// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and
@@ -118,7 +117,6 @@ impl Transaction for ReadTable {
             Ok(table) if table.as_bytes().len() != self.bytes.len() => {
                 Err(LinkError::Impossible("bytes behind its table"))
             }
-            Ok(table) if !table.names().all(is_printable) => Err(LinkError::Impossible(TEXT)),
             Ok(_) => Ok(std::mem::take(&mut self.bytes)),
         }
     }

@@ -9,8 +9,8 @@ use serde::Serialize;
 use tactus_core::explorer::{self, ExpectedOutcome};
 use tactus_core::features::{Movement, Property, PropertySet};
 use tactus_core::probe::explore::Random;
-use tactus_core::table::{Action, Table as Read};
-use tactus_lab::eval::evaluate::{MAX_TEXTURES, Method, explorer};
+use tactus_core::table::{Action, MAX_TEXTURES, Table as Read};
+use tactus_lab::eval::evaluate::{Method, explorer};
 use tactus_lab::eval::transcript::Answer;
 use tactus_lab::eval::verify;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use tactus_core::explorer::Method;
 use tactus_core::features::Movement;
 use tactus_core::table::{Change, Name, Table, amend};
-use tactus_core::wire::{Command, Forget, Identify, Train};
+use tactus_core::wire::{Command, Forget, Identify, PART, Train};
 use tactus_emulator::board::FlashWrite;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::{self, FirmwareData, Unknown};
@@ -214,8 +214,14 @@ fn no_erase_costs_the_watchdogs_patience() {
     talk.board().slow_erases().unwrap();
     for sector in [4, 5] {
         let from_ns = talk.now_ns();
-        let begin = Command::BeginTable(long.len() as u32);
-        talk.send(begin, TIMEOUT_S, |_, _| ()).unwrap();
+        // the first bytes say that a table comes: only then is anything erased
+        let first = Command::WriteTable {
+            offset: 0,
+            bytes: long[..PART].iter().copied().collect(),
+        };
+        for command in [Command::BeginTable(long.len() as u32), first] {
+            talk.send(command, TIMEOUT_S, |_, _| ()).unwrap();
+        }
         let took_ms = (talk.now_ns() - from_ns) / 1_000_000;
         let wanted_ms = if sector == 4 { 1200 } else { 2000 };
         assert!((wanted_ms..wanted_ms + 300).contains(&took_ms), "{took_ms}");

@@ -8,10 +8,8 @@ use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::explorer::{Config, Explorer, ExplorerError, Method};
 use tactus_core::features::{PropertySet, Vector, WHITE_STEPS};
-use tactus_core::table::{Against, Drifts, EPISODES, Limits, Table, Tail, Whitened};
+use tactus_core::table::{Against, Drifts, EPISODES, Limits, MAX_TEXTURES, Table, Tail, Whitened};
 
-const FEW: usize = tactus_core::table::MAX_TEXTURES;
-const MOST: usize = 2048;
 const DRAWS: usize = 8;
 /// Largest correction of a slide's distance, squared.
 const FARTHEST: f64 = 5.0;
@@ -40,27 +38,15 @@ pub(crate) fn limits(
     white: &[Vec<Vec<Vector>>],
     drifts: Option<&[Drifts]>,
 ) -> Result<Limits, ExplorerError> {
-    // a large explorer takes longer than a score
-    let of = if known.len() <= FEW {
-        limits_of::<FEW>
-    } else {
-        limits_of::<MOST>
-    };
-    of(false_alarm, table, known, white, drifts)
-}
-
-fn limits_of<const N: usize>(
-    false_alarm: f32,
-    table: Table<'_>,
-    known: &[Vec<Whitened>],
-    white: &[Vec<Vec<Vector>>],
-    drifts: Option<&[Drifts]>,
-) -> Result<Limits, ExplorerError> {
     let config = Config {
         method: Method::Fused,
         ..Config::default()
     };
-    let explorer = Box::new(Explorer::<N>::new(table, PropertySet::ALL, config)?);
+    let explorer = Box::new(Explorer::<MAX_TEXTURES>::new(
+        table,
+        PropertySet::ALL,
+        config,
+    )?);
     let residuals = residuals(known, white);
     let slides: usize = white.iter().flatten().map(Vec::len).sum();
     let weight = slides.saturating_sub(white.len()) as f64;

@@ -8,13 +8,10 @@ use serde::Serialize;
 use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy, VerdictKind};
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
-use tactus_core::table::{Action, Table, TableError};
+use tactus_core::table::{Action, MAX_TEXTURES, Table, TableError};
 
 use crate::eval::experiment::{Experiment, Run};
 use crate::eval::learn;
-
-/// Most textures that a PC explores among.
-pub const MAX_TEXTURES: usize = 2048;
 
 /// The method of a run: its comparison and its choice of movements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
