@@ -55,8 +55,8 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Begins a table of `length` bytes, in a slot of which the loss matters least: see [`crate::store`]. That is
-    /// erased when the header of a table of this length has come, not before. The table in use stays until the new one is
-    /// committed. One that was begun before and not committed is given up.
+    /// erased when the header of a table of this length has come, not before. The table in use stays until the new one
+    /// is committed. One that was begun before and not committed is given up.
     pub async fn begin_table(&mut self, length: usize) -> Result<(), StoreError> {
         self.slots.push = None;
         if length > Self::MAX_TABLE {

@@ -161,10 +161,10 @@ impl Collection {
         self.learn_at(&Self::MOVEMENTS, (method, None), &[], calibration, done)
     }
 
-    /// The same at these movements; the fused method learns these features, or the best there are (band powers alone are
-    /// for a rig that does not measure shear). With statistics of slides after each of these lengths, in ms at constant
-    /// speed, the shortest first.
-    /// Errors: the first fault of a rig, or slide without properties; lengths that no table has.
+    /// The same at these movements; the fused method learns these features, or the best there are (band powers alone
+    /// are for a rig that does not measure shear). With statistics of slides after each of these lengths, in ms at
+    /// constant speed, the shortest first. Errors: the first fault of a rig, or slide without properties; lengths that
+    /// no table has.
     pub fn learn_at(
         &self,
         movements: &[Movement],

@@ -188,8 +188,8 @@ impl fmt::Display for Outcome {
 }
 
 impl Outcome {
-    /// What is wrong with a rig that has come to rest, by the world: its finger is lifted, unless a fault was named that
-    /// says how it is freed.
+    /// Notes the faults of a rig that has come to rest, by the world: its finger is lifted, unless a fault was named
+    /// that says how it is freed.
     pub fn judge_rest(truth: &Truth, named: &[Named], wrong: &mut Vec<String>) {
         if truth.speed_mm_s.abs() > STANDS_MM_S {
             wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));

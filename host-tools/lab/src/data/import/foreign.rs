@@ -147,9 +147,9 @@ impl Survey {
         settings
     }
 
-    /// Writes the recordings into a folder that is not there yet; `progress` gets the slides done, and of all. Returns the
-    /// slides that were left out, and why: those of a dead sensor, copies.
-    /// Errors: A file cannot be read again, or not be written.
+    /// Writes the recordings into a folder that is not there yet; `progress` gets the slides done, and of all. Returns
+    /// the slides that were left out, and why: those of a dead sensor, copies. Errors: A file cannot be read again, or
+    /// not be written.
     pub fn write(&self, to: &Path, progress: &dyn Fn(usize, usize)) -> Result<Vec<String>> {
         let textures = (1..).zip(&self.textures).map(|(id, name)| Texture {
             id,
