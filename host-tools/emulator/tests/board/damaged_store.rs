@@ -1,9 +1,12 @@
 //! Stores that are damaged. Each begins as the golden store of `tests/core/formats.rs`: a table of the factory, a newer
 //! one, and a record of each kind.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use embassy_futures::block_on;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
 use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::Store;
@@ -140,4 +143,108 @@ fn a_damaged_table_is_reported_and_not_replaced_in_silence() {
     drop(talk);
     let (mut talk, told) = troubles(&elf, store);
     assert_eq!((table(&mut talk), told), (older, Vec::new()));
+}
+
+/// CRC-32 (ISO-HDLC), bit by bit.
+fn crc(bytes: &[u8]) -> [u8; 4] {
+    let of_byte = |crc: u32, byte: &u8| {
+        let step = |crc: u32, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
+        (0..8).fold(crc ^ u32::from(*byte), step)
+    };
+    (!bytes.iter().fold(!0, of_byte)).to_le_bytes()
+}
+
+/// A table of nonsense with a right checksum: far too many textures, or bytes of `good` that are others.
+fn nonsense(random: &mut ChaCha8Rng, good: &[u8]) -> Vec<u8> {
+    let mut table = if random.random() {
+        let textures = random.random_range(129..2700_u16);
+        let mut table = b"TACT\x01\0\0\x07\0\0\0\0".to_vec();
+        table.extend(textures.to_le_bytes());
+        // a movement of 0.5 N and 25 mm/s
+        table.extend([1, 0, 0xf4, 0x01, 0xa8, 0x61, 0, 0]);
+        let many = usize::from(textures);
+        // a mean and a standard deviation of 1 for each property, and two trials
+        table.extend([1, 0, 1, 0].repeat(3 * many));
+        table.extend([2].repeat(many));
+        table.extend([0; 4]);
+        for number in 0..textures {
+            table.extend(number.to_le_bytes());
+            table.extend([2, 0, 0]);
+        }
+        for number in 0..textures {
+            table.push(4);
+            table.extend(format!("{number:04}").into_bytes());
+        }
+        table
+    } else {
+        let mut table = good[..good.len() - 4].to_vec();
+        for _ in 0..random.random_range(1..9) {
+            let at = random.random_range(6..table.len());
+            table[at] = random.random();
+        }
+        table
+    };
+    let length = table.len() as u32 + 4;
+    table[8..12].copy_from_slice(&length.to_le_bytes());
+    let checksum = crc(&table);
+    table.extend(checksum);
+    table
+}
+
+/// The store with this table as the newest one, as if it had been committed.
+fn holding(table: &[u8]) -> Vec<u8> {
+    let mut store = store();
+    // the first of the sectors that are larger
+    let at = 4 * (16 << 10);
+    let mut slot = b"SLOT\x01\0\0\0\xff\xff\0\0".to_vec();
+    slot.extend((table.len() as u32).to_le_bytes());
+    slot.extend(&table[table.len() - 4..]);
+    slot.extend(crc(&slot));
+    slot.extend([0xff; 4]);
+    slot.extend(b"COMM");
+    slot.extend(table);
+    store[at..at + slot.len()].copy_from_slice(&slot);
+    store
+}
+
+/// Boots boards on such tables: each answers, with some table, after at most one reset by itself.
+fn boots_whatever_is_stored(seeds: RangeInclusive<u64>) {
+    let Some(elf) = elf() else { return };
+    let held = held();
+    let good = store();
+    let length = u32::from_le_bytes(good[held.newest_at + 8..][..4].try_into().unwrap());
+    let good = &good[held.newest_at..][..length as usize];
+    let mut refused = 0;
+    for seed in seeds {
+        let table = nonsense(&mut ChaCha8Rng::seed_from_u64(seed), good);
+        let options = Options {
+            store: Some(holding(&table)),
+            ..Options::default()
+        };
+        let world = Collection::new(3, Vec::new(), 0);
+        let mut talk = Talk::new(mounted(&world, 31, 9).start(&elf, options).unwrap());
+        let told = loop {
+            assert!(talk.now_ns() < 30_000_000_000, "seed {seed}: no answer");
+            let status = talk.run(Request::status(), TIMEOUT_S, |_, _| ());
+            match status {
+                Ok(status) if status.textures > 0 => break status,
+                _ => talk.board().run_ms(100).unwrap(),
+            }
+        };
+        let resets = talk.board().resets().unwrap();
+        assert!(resets.len() <= 1, "seed {seed}: {resets:?}");
+        refused += u32::from(told.table_bytes as usize != table.len());
+    }
+    assert!(refused > 0);
+}
+
+#[test]
+fn a_stored_table_of_nonsense_costs_one_reset_at_most() {
+    boots_whatever_is_stored(1..=4);
+}
+
+#[test]
+#[ignore = "long"]
+fn no_stored_table_of_500_costs_more_than_one_reset() {
+    boots_whatever_is_stored(1..=500);
 }
