@@ -11,7 +11,7 @@ use tactus_core::probe::teach::put_in_force;
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::Store;
 use tactus_core::table::{Change, Table, TableError, amend};
-use tactus_core::wire::{Event, Failure, MemoryError};
+use tactus_core::wire::{Event, Failure, MemoryError, Status};
 use tactus_emulator::board::Options;
 use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_emulator::host::under_finger::mounted;
@@ -19,6 +19,7 @@ use tactus_lab::sim::collection::Collection;
 use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_link::{PushTable, ReadTable, Request};
 
+use crate::broken_code::{Instead, break_code};
 use crate::common::{elf, unpacked};
 
 fn store() -> Vec<u8> {
@@ -207,24 +208,25 @@ fn holding(table: &[u8]) -> Vec<u8> {
     store
 }
 
-/// A board on this table as it answers, with some table; it has had one reset by itself at most.
-fn boots(elf: &Path, table: &[u8], what: &str) -> Talk {
+/// A board on this store as it answers, with some table: what it is then, and the resets by itself before.
+fn answers(elf: &Path, store: Vec<u8>, hangs: bool) -> (Talk, Status, usize) {
     let options = Options {
-        store: Some(holding(table)),
+        store: Some(store),
         ..Options::default()
     };
     let world = Collection::new(3, Vec::new(), 0);
     let mut talk = Talk::new(mounted(&world, 31, 9).start(elf, options).unwrap());
+    if hangs {
+        break_code(talk.board(), "tactus_stored_table", Instead::Hangs);
+    }
     loop {
-        assert!(talk.now_ns() < 30_000_000_000, "{what}: no answer");
+        let resets = talk.board().resets().unwrap();
+        assert!(talk.now_ns() < 30_000_000_000, "no answer; {resets:?}");
         match talk.run(Request::status(), TIMEOUT_S, |_, _| ()) {
-            Ok(status) if status.textures > 0 => break,
+            Ok(status) if status.textures > 0 => return (talk, status, resets.len()),
             _ => talk.board().run_ms(100).unwrap(),
         }
     }
-    let resets = talk.board().resets().unwrap();
-    assert!(resets.len() <= 1, "{what}: {resets:?}");
-    talk
 }
 
 fn boots_whatever_is_stored(seeds: RangeInclusive<u64>) {
@@ -240,13 +242,25 @@ fn boots_whatever_is_stored(seeds: RangeInclusive<u64>) {
         name: "another",
     };
     let other = amend(&mut other, &Table::read(good).unwrap(), rename).unwrap();
-    let in_force = table(&mut boots(&elf, other.as_bytes(), "good"));
+    let (mut talk, ..) = answers(&elf, holding(other.as_bytes()), false);
+    let in_force = table(&mut talk);
     let in_force = Table::read(&in_force).unwrap();
     assert!(in_force.names().any(|name| name == "another"));
     for seed in seeds {
         let table = nonsense(&mut ChaCha8Rng::seed_from_u64(seed), good);
-        boots(&elf, &table, &format!("seed {seed}"));
+        let (_, _, resets) = answers(&elf, holding(&table), false);
+        assert!(resets <= 1, "seed {seed}: {resets}");
     }
+}
+
+/// Whatever it is in a stored table that its reading never ends by: it is read once.
+#[test]
+fn a_stored_table_whose_reading_hangs_costs_one_reset() {
+    let Some(elf) = elf() else { return };
+    let (_, whole, none) = answers(&elf, store(), false);
+    assert_eq!((whole.factory, none), (false, 0));
+    let (_, status, resets) = answers(&elf, store(), true);
+    assert_eq!((status.factory, resets), (true, 1));
 }
 
 #[test]
