@@ -123,7 +123,7 @@ fn a_session_does_what_was_meant() {
     );
     assert_says(
         &bench.error(&format!("teach {}", "x".repeat(41))),
-        &["40 bytes"],
+        &["41 bytes: shorten it to 40"],
     );
     assert_says(
         &bench.error("monitor"),

@@ -116,7 +116,7 @@ def test_a_training_says_each_slide():
         events = list(ours.train("cork", trials=2, seed=3))
         assert [next(iter(e["event"])) for e in events] == ["TrainingSlide", "TrainingSlide", "Done"]
         assert probe.asked == [("Train", {"name": "cork", "trials": 2, "pilot": False, "seed": 3})]
-        with pytest.raises(ValueError, match="40 bytes"):
+        with pytest.raises(ValueError, match="41 bytes: shorten it to 40"):
             ours.train("c" * 41)
 
 
