@@ -21,7 +21,7 @@ fn summary(experiment: &Experiment, method: Method, runs: u64) -> Summary {
         ..Config::default()
     };
     let outcomes = evaluate(experiment, config, runs, || ()).unwrap();
-    Summary::new(&outcomes, experiment.names(), config.max_slides)
+    Summary::new(&outcomes, &experiment.names, config.max_slides)
 }
 
 fn recorded(folder: &Path, protocol: Protocol, train_slides: usize) -> Experiment {
@@ -110,9 +110,9 @@ fn property_worlds_give_the_reference_figures() {
         let experiment = Experiment::given(&set, None, 1).unwrap();
         assert_eq!(
             (
-                experiment.names().len(),
-                experiment.movements().len(),
-                experiment.train_slides()
+                experiment.names.len(),
+                experiment.movements.len(),
+                experiment.train_slides
             ),
             (117, 3, 5)
         );
@@ -273,14 +273,14 @@ fn session(experiment: &Experiment, learns: bool, asks: bool) -> Session {
         ..Config::default()
     };
     let mut bytes = experiment.run(0).learn(config.method).unwrap();
-    let textures = experiment.names().len();
+    let textures = experiment.names.len();
     let sessions: Vec<_> = (0..textures).map(|t| experiment.session(t)).collect();
     let times = sessions[0][0].1.len();
     let (mut right, mut uncertain, mut distances) = (vec![0.0; textures], 0.0, Vec::new());
     for time in 0..times {
         for (texture, movements) in sessions.iter().enumerate() {
             let slide = &movements[0].1[time];
-            let mut explorer = explorer(&bytes, experiment.measured(), config, None).unwrap();
+            let mut explorer = explorer(&bytes, experiment.measured, config, None).unwrap();
             let action = Action {
                 movement: 0,
                 property: None,

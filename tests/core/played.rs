@@ -166,7 +166,7 @@ fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
     );
     let (experiment, config) = (experiment.unwrap(), config(method));
     let outcomes = evaluate(&experiment, config, count(8000, 1000), || ()).unwrap();
-    Summary::new(&outcomes, experiment.names(), config.max_slides).accuracy
+    Summary::new(&outcomes, &experiment.names, config.max_slides).accuracy
 }
 
 #[test]

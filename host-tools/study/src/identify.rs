@@ -88,7 +88,7 @@ fn identify(
     done: impl Fn() + Sync,
 ) -> anyhow::Result<Column> {
     let outcomes = evaluate(experiment, config(method), simulations, done)?;
-    let summary = Summary::new(&outcomes, experiment.names(), MAX_SLIDES);
+    let summary = Summary::new(&outcomes, &experiment.names, MAX_SLIDES);
     let right = |o: &&Outcome| o.identified == o.unknown;
     let textures = IDENTIFIED.iter().map(|&number| {
         let of: Vec<&Outcome> = outcomes
@@ -144,7 +144,7 @@ pub fn pairs(
         let candidates = pair.textures.map(|number| u16::from(number) - 1);
         let among = experiment.clone().among(&candidates);
         let outcomes = evaluate(&among, config, simulations, &done)?;
-        let summary = Summary::new(&outcomes, among.names(), MAX_PAIR_SLIDES);
+        let summary = Summary::new(&outcomes, &among.names, MAX_PAIR_SLIDES);
         Ok(PairRow {
             textures: pair.textures.map(Named::new),
             correct: 100.0 * summary.accuracy,

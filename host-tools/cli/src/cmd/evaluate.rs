@@ -42,7 +42,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         config,
         with_courses,
     };
-    let names = experiment.names().to_vec();
+    let names = experiment.names.clone();
     let (evaluation, courses) = evaluation(experiment, &asked, |[stage, stages], work| {
         let what = format!("exploring, {stage} of {stages}");
         with_progress(args.runs(), what, work)

@@ -50,8 +50,8 @@ pub struct Touch {
 
 #[derive(Debug, Default)]
 pub(crate) struct Recorder {
-    slides: Vec<Slide>,
-    touches: Vec<Touch>,
+    pub(crate) slides: Vec<Slide>,
+    pub(crate) touches: Vec<Touch>,
     now: Option<Slide>,
     expected_mm_s: Option<f64>,
     /// one in a ms
@@ -63,14 +63,6 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    pub(crate) fn slides(&self) -> &[Slide] {
-        &self.slides
-    }
-
-    pub(crate) fn touches(&self) -> &[Touch] {
-        &self.touches
-    }
-
     pub(crate) fn expect_speed(&mut self, mm_s: f64) {
         self.expected_mm_s = Some(mm_s);
     }

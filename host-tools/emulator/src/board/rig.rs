@@ -181,12 +181,12 @@ impl Rig {
 
     /// The ground truth of every slide so far.
     pub fn slides(&self) -> &[Slide] {
-        self.recorder.slides()
+        &self.recorder.slides
     }
 
     /// Every contact so far.
     pub fn touches(&self) -> &[Touch] {
-        self.recorder.touches()
+        &self.recorder.touches
     }
 
     /// Sample commands that the sensor got since power-up, one in each slot.

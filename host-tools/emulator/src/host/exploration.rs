@@ -3,16 +3,16 @@
 use serde_json::{Value, json};
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Movement, PropertySet};
-use tactus_core::table::{Table, TableError};
+use tactus_core::table::Table;
 use tactus_core::wire::{Command, Counts, Event, Identify, Report, Verdict};
 use tactus_lab::eval::show::count;
 use tactus_link::Request;
 use tactus_link::follow::{ALLOWED, Agreement, Follower};
 use tactus_world::played::PlayCounts;
 
-use super::talk::{TIMEOUT_S, Talk, TalkError};
+use super::talk::{TIMEOUT_S, Talk};
 use crate::board::referee::Violation;
-use crate::board::{self, Emulator, Slide};
+use crate::board::{Emulator, Slide};
 
 /// Samples that the sensor sees at boot, while the firmware finds out which finger there is; 14 of an MCP3202, which
 /// takes every command for one of its own.
@@ -28,27 +28,6 @@ pub(crate) const FORCE_N: f64 = 0.0115;
 pub const SPEED_SHARE: f64 = 0.01;
 /// Largest deviation of a slot from its grid, us.
 pub(crate) const JITTER_US: f64 = 2.0;
-
-/// Reasons why there is no exploration to judge.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExploreError {
-    /// The firmware did not carry out a request.
-    #[error(transparent)]
-    Talk(#[from] TalkError),
-    /// The table cannot be read.
-    #[error("the table is damaged: {0}")]
-    Table(#[from] TableError),
-    /// The exploration cannot be followed.
-    #[error("the exploration cannot be followed: {0}")]
-    Follow(#[from] tactus_core::explorer::ExplorerError),
-}
-
-impl From<board::Error> for ExploreError {
-    fn from(why: board::Error) -> Self {
-        Self::Talk(why.into())
-    }
-}
 
 /// An exploration, as the firmware reported it and in truth.
 #[derive(Clone, Debug)]
@@ -91,7 +70,7 @@ pub fn explore(
     identify: Identify,
     truth: &str,
     mut each: impl FnMut(&mut Emulator, Option<&Report>),
-) -> Result<Exploration, ExploreError> {
+) -> anyhow::Result<Exploration> {
     let plan = Plan::new();
     let table = Table::read(table)?;
     let mut follower = Follower::new(table, PropertySet::ALL, &identify, &plan)?;
@@ -150,23 +129,6 @@ pub fn explore(
     })
 }
 
-/// Largest error of a slide's force: N, relative, and true if it is too large.
-fn force_error(slides: &[(Movement, Slide)]) -> (f64, f64, bool) {
-    let errors = slides.iter().map(|(movement, slide)| {
-        let wanted = f64::from(movement.force_n());
-        let error = (slide.force_n - wanted).abs();
-        (error, error / wanted)
-    });
-    errors.fold((0.0, 0.0, false), |worst, (newtons, share)| {
-        let over = newtons > FORCE_N && share > FORCE_SHARE;
-        (
-            f64::max(worst.0, newtons),
-            f64::max(worst.1, share),
-            worst.2 || over,
-        )
-    })
-}
-
 impl Exploration {
     /// Returns true if the verdict is the texture under the finger, or is right that the table does not have it.
     pub fn right(&self) -> bool {
@@ -182,10 +144,21 @@ impl Exploration {
         self.agreement.agrees() && self.not_followed.is_empty()
     }
 
-    /// Largest error of a slide's force: N, and relative.
-    pub(crate) fn force_error(&self) -> (f64, f64) {
-        let (newtons, share, _) = force_error(&self.slides);
-        (newtons, share)
+    /// Largest error of a slide's force: N, relative, and true if it is too large.
+    pub(crate) fn force_error(&self) -> (f64, f64, bool) {
+        let errors = self.slides.iter().map(|(movement, slide)| {
+            let wanted = f64::from(movement.force_n());
+            let error = (slide.force_n - wanted).abs();
+            (error, error / wanted)
+        });
+        errors.fold((0.0, 0.0, false), |worst, (newtons, share)| {
+            let over = newtons > FORCE_N && share > FORCE_SHARE;
+            (
+                f64::max(worst.0, newtons),
+                f64::max(worst.1, share),
+                worst.2 || over,
+            )
+        })
     }
 
     fn force_errors(&self) -> Vec<f64> {
@@ -229,7 +202,7 @@ impl Exploration {
                 missed.push(what);
             }
         };
-        let (newtons, share, too_far) = force_error(&self.slides);
+        let (newtons, share, too_far) = self.force_error();
         let (mn, percent) = (newtons * 1e3, share * 100.0);
         check(!too_far, format!("force off by {mn:.1} mN, {percent:.1} %"));
         let speed = self.speed_error();

@@ -4,12 +4,12 @@ use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
-use tactus_lab::sim::collection::{Collection, texture_number};
+use tactus_lab::sim::collection::Collection;
 use tactus_lab::sim::recorded::RecordedTexture;
 
 use super::args::World;
 use super::progress;
-use super::under_finger::{self, FirmwareData, TRIALS, UnderFingerError, Unknown};
+use super::under_finger::{self, FirmwareData, TRIALS, Unknown};
 
 enum Textures {
     Simulated(Collection),
@@ -27,7 +27,7 @@ pub struct Chosen {
 
 impl Chosen {
     /// Draws the values that the arguments leave open.
-    pub fn new(cli: &World) -> Result<Self, UnderFingerError> {
+    pub fn new(cli: &World) -> anyhow::Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(cli.seed);
         if let Some(name) = &cli.recording {
             let recorded_texture = under_finger::recordings(cli.method.method(), cli.seed)?;
@@ -39,9 +39,7 @@ impl Chosen {
             });
         }
         let texture = match &cli.texture {
-            Some(name) => {
-                texture_number(name).ok_or_else(|| UnderFingerError::NoTexture(name.clone()))?
-            }
+            Some(name) => under_finger::number(name)?,
             None => random.random_range(1..=117),
         };
         let textures = Collection::spread(texture, cli.among);
@@ -56,7 +54,7 @@ impl Chosen {
     }
 
     /// Calibration of the rig and table of the textures for a method.
-    pub fn learn(&self, method: Method) -> Result<FirmwareData, UnderFingerError> {
+    pub fn learn(&self, method: Method) -> anyhow::Result<FirmwareData> {
         let bar;
         let known = match &self.textures {
             Textures::Simulated(collection) => {

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use anyhow::{Context as _, bail};
 use tactus_core::explorer::Method;
 use tactus_core::rig::calibration::RigCalibration;
-use tactus_lab::data::recordings::{RecordingError, RecordingSet};
-use tactus_lab::sim::collection::{Collection, LearnError, calibrated, texture_name};
+use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::sim::collection::{Collection, calibrated, texture_name, texture_number};
 use tactus_lab::sim::recorded::RecordedTexture;
 use tactus_world::played::Played;
 use tactus_world::world::Setup;
@@ -17,38 +18,6 @@ pub const TRIALS: u32 = 5;
 /// Limits of recordings.
 pub(crate) const RECORDED_LIMITS: &str = "Recordings: one movement, 3 of their 5 s are played, and what 12 bits do not \
      hold is clipped; learned and explored slides are of one session (interleaved).";
-
-/// Reasons why there is nothing to learn, or no texture under the finger.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum UnderFingerError {
-    /// There are no recordings.
-    #[error(
-        "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, and \
-         set TACTUS_DATA to the folder that holds biotac/",
-        .0.display()
-    )]
-    NoData(PathBuf),
-    /// They cannot be played.
-    #[error(transparent)]
-    Play(#[from] RecordingError),
-    /// The simulated rig failed.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
-    /// There is no such texture in the simulated world.
-    #[error(
-        "no texture {0} in Table 1: `tactus textures` lists them, or give a number from 1 to 117"
-    )]
-    NoTexture(String),
-    /// There is no such texture in the recordings.
-    #[error("no material {name}; there are {known}, or give a number from 1")]
-    NoMaterial {
-        /// The name that was given.
-        name: String,
-        /// The names that exist.
-        known: String,
-    },
-}
 
 /// The firmware's calibration and table.
 #[derive(Clone, PartialEq, Debug)]
@@ -81,6 +50,13 @@ impl Unknown {
     }
 }
 
+/// Number of a texture of Table 1 by its name or its number.
+pub(crate) fn number(name: &str) -> anyhow::Result<u8> {
+    texture_number(name).with_context(|| {
+        format!("no texture {name} in Table 1: `tactus textures` lists them, or give a number from 1 to 117")
+    })
+}
+
 /// Learns the textures of a simulated world for a method, with statistics of slides after these lengths, ms; `done` is
 /// called after each.
 pub fn simulated(
@@ -88,9 +64,9 @@ pub fn simulated(
     method: Method,
     lengths_ms: &[u16],
     done: impl Fn() + Sync,
-) -> Result<FirmwareData, UnderFingerError> {
+) -> anyhow::Result<FirmwareData> {
     let first = collection.textures.first().copied().unwrap_or(1);
-    let calibration = calibrated(collection.setup(first, 0)).map_err(LearnError::from)?;
+    let calibration = calibrated(collection.setup(first, 0))?;
     let (movements, how) = (&Collection::MOVEMENTS, (method, None));
     let table = collection.learn_at(movements, how, lengths_ms, calibration, done)?;
     Ok(FirmwareData { calibration, table })
@@ -116,14 +92,18 @@ fn recorded_trials(method: Method) -> usize {
 
 /// The recordings of a real finger, to be learned from and played: in `biotac` below `TACTUS_DATA`, or else below
 /// `shared/data` beside the repository.
-pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, UnderFingerError> {
+pub fn recordings(method: Method, seed: u64) -> anyhow::Result<RecordedTexture> {
     let root = std::env::var_os("TACTUS_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
         PathBuf::from,
     );
     let folder = root.join("biotac");
     if !folder.is_dir() {
-        return Err(UnderFingerError::NoData(folder));
+        bail!(
+            "no recordings in {}: make them from github.com/dexrob/BioTac_slide_20_50 in the layout of data/biotac, \
+             and set TACTUS_DATA to the folder that holds biotac/",
+            folder.display()
+        );
     }
     let set = RecordingSet::open(&folder)?;
     Ok(RecordedTexture::interleaved(
@@ -137,22 +117,22 @@ pub fn recordings(method: Method, seed: u64) -> Result<RecordedTexture, UnderFin
 pub fn recorded(
     recorded_texture: &RecordedTexture,
     method: Method,
-) -> Result<FirmwareData, UnderFingerError> {
-    let calibration = calibrated(RecordedTexture::setup(0)).map_err(LearnError::from)?;
+) -> anyhow::Result<FirmwareData> {
+    let calibration = calibrated(RecordedTexture::setup(0))?;
     let table = recorded_texture.learn(method, calibration)?;
     Ok(FirmwareData { calibration, table })
 }
 
 /// Number of a material by its name, in any case, or by its number from 1.
-pub fn material(recorded_texture: &RecordedTexture, name: &str) -> Result<usize, UnderFingerError> {
+pub fn material(recorded_texture: &RecordedTexture, name: &str) -> anyhow::Result<usize> {
     let number = name.parse().ok().map(|n: usize| n.wrapping_sub(1));
     let mut names = recorded_texture.names.iter();
     names
         .position(|known| known.eq_ignore_ascii_case(name))
         .or(number.filter(|n| *n < recorded_texture.names.len()))
-        .ok_or_else(|| UnderFingerError::NoMaterial {
-            name: name.to_owned(),
-            known: recorded_texture.names.join(", "),
+        .with_context(|| {
+            let known = recorded_texture.names.join(", ");
+            format!("no material {name}; there are {known}, or give a number from 1")
         })
 }
 

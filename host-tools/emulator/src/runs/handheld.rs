@@ -5,7 +5,7 @@ use clap::Args as Arguments;
 use serde_json::json;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Command, Counts, Event};
-use tactus_lab::sim::collection::{Collection, texture_name, texture_number};
+use tactus_lab::sim::collection::{Collection, texture_name};
 use tactus_link::Session;
 use tactus_world::person::Manner;
 use tactus_world::textures::TEXTURES;
@@ -14,7 +14,7 @@ use crate::board::{Display, Emulator, Error};
 use crate::host::args::{Firmware, Format};
 use crate::host::hand::{Holder, SLIDE_S, Seen};
 use crate::host::milestones::Milestones;
-use crate::host::under_finger::UnderFingerError;
+use crate::host::under_finger;
 
 /// The firmware's table is of this world.
 const WORLD: u64 = 1;
@@ -101,9 +101,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let text = args.format == Format::Text;
     let sha256 = args.firmware.show(text)?;
     let number = match &args.texture {
-        Some(name) => {
-            texture_number(name).ok_or_else(|| UnderFingerError::NoTexture(name.clone()))?
-        }
+        Some(name) => under_finger::number(name)?,
         // neighbours of the table are alike
         None => TEXTURES[(args.seed * 31) as usize % TEXTURES.len()].number,
     };

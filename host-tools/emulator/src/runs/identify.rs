@@ -11,7 +11,7 @@ use tactus_lab::eval::show::{Show, count, is_right};
 
 use crate::board::{self, Emulator, Options};
 use crate::host::args::{Format, World};
-use crate::host::exploration::{self, Exploration, ExploreError};
+use crate::host::exploration::{self, Exploration};
 use crate::host::learned::Chosen;
 use crate::host::milestones::Milestones;
 use crate::host::progress;
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let sha256 = world.firmware.show(text)?;
     let chosen = Chosen::new(world)?;
     let known = chosen.learn(world.method.method())?;
-    let table = Table::read(&known.table).map_err(ExploreError::from)?;
+    let table = Table::read(&known.table)?;
     let truth = &chosen.unknown.name;
     if text {
         println!(

@@ -190,9 +190,9 @@ pub(super) fn evaluate_by<T: Send>(
         let bytes = learn(0)?;
         let explorer = explorer(
             &bytes,
-            experiment.measured(),
+            experiment.measured,
             config,
-            experiment.candidates(),
+            experiment.candidates.as_deref(),
         )?;
         let run = |explorer: &mut Box<_>, index| run(explorer, index);
         let all = (0..runs).into_par_iter().panic_fuse();
@@ -205,9 +205,9 @@ pub(super) fn evaluate_by<T: Send>(
         let bytes = learn(first)?;
         let mut explorer = explorer(
             &bytes,
-            experiment.measured(),
+            experiment.measured,
             config,
-            experiment.candidates(),
+            experiment.candidates.as_deref(),
         )?;
         let runs = first..runs.min(first + round);
         let played = runs.map(|index| run(&mut explorer, index));

@@ -81,7 +81,7 @@ pub fn evaluation(
         outcomes = evaluate(&experiment, config, runs, done)?;
         Ok(())
     })?;
-    let summary = Summary::new(&outcomes, experiment.names(), config.max_slides);
+    let summary = Summary::new(&outcomes, &experiment.names, config.max_slides);
     let (experiment, config) = as_told(experiment, config);
     let mut told = Vec::new();
     stage([2, stages], &mut |done| {
@@ -95,12 +95,12 @@ pub fn evaluation(
             Ok(())
         })?;
     }
-    let names = experiment.names();
+    let names = &experiment.names;
     let evaluation = Evaluation {
         reliability: statements(&all, config.threshold),
         method,
         protocol: request.protocol,
-        train_slides: experiment.train_slides(),
+        train_slides: experiment.train_slides,
         runs,
         textures: names.len(),
         threshold: config.threshold,

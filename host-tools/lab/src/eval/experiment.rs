@@ -69,20 +69,23 @@ struct Pool {
 /// A set of textures with a way to divide their slides.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    names: Vec<String>,
-    movements: Vec<Movement>,
+    /// Names of the textures.
+    pub names: Vec<String>,
+    /// The movements.
+    pub movements: Vec<Movement>,
     /// Per texture and movement.
     pools: Vec<Vec<Pool>>,
     unknowns: Vec<usize>,
     /// Textures that the unknown one can be, as far as the explorer knows; all, unless given.
-    candidates: Option<Vec<u16>>,
+    pub candidates: Option<Vec<u16>>,
     /// Training slides per texture and movement; the fewest of any, where all are used.
-    train_slides: usize,
+    pub train_slides: usize,
     /// Training slides are drawn; otherwise they are the first.
     drawn: bool,
     /// All training slides are used, as many as there happen to be; not with drawn ones.
     all: bool,
-    measured: PropertySet,
+    /// The properties that every slide has.
+    pub measured: PropertySet,
     /// Features of the fused method; the best there are, unless given.
     features: Option<FeatureSet>,
     expected: Expected,
@@ -338,11 +341,6 @@ impl Experiment {
         }
     }
 
-    /// Textures that the unknown one can be; `None` for all.
-    pub fn candidates(&self) -> Option<&[u16]> {
-        self.candidates.as_deref()
-    }
-
     /// All slides of a texture in the order of time, by movement: those to learn from, and those after them.
     pub fn session(&self, texture: usize) -> Vec<(&[Observation], &[Observation])> {
         let pools = self.pools.get(texture).map_or(&[][..], Vec::as_slice);
@@ -353,26 +351,6 @@ impl Experiment {
                 (pool.train.as_slice(), later)
             })
             .collect()
-    }
-
-    /// Names of the textures.
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    /// The movements.
-    pub fn movements(&self) -> &[Movement] {
-        &self.movements
-    }
-
-    /// The properties that every slide has.
-    pub fn measured(&self) -> PropertySet {
-        self.measured
-    }
-
-    /// Training slides per texture and movement; the fewest of any, where all are used.
-    pub fn train_slides(&self) -> usize {
-        self.train_slides
     }
 
     /// Returns true if every run learns from the same slides.

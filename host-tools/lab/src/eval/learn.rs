@@ -165,7 +165,7 @@ pub struct ObservedTrial {
 
 /// As [`learn_for`], with features after each of these lengths, in ms at constant speed, the shortest first: those that
 /// each trial was observed at.
-pub fn learn_lengths(
+pub(crate) fn learn_lengths(
     expected: &Expected,
     (method, features): (Method, Option<FeatureSet>),
     names: &[String],

@@ -123,7 +123,7 @@ pub fn leave_one_out(
         .map(|index| {
             let mut run = experiment.run_alone(index);
             let presented = run.unknown;
-            let textures = experiment.names().len();
+            let textures = experiment.names.len();
             let other = presented + 1 + run.random.random_range(0..textures - 1);
             let outs = [presented, other % textures];
             let tables = [table(&run, outs[0])?, table(&run, outs[1])?];
@@ -131,7 +131,7 @@ pub fn leave_one_out(
             let known = episode(experiment, open, &mut run, outs[1], &tables[1])?;
             let told = |out: usize, bytes: &[u8]| {
                 let run = as_told.run_alone(index);
-                let mut explorer = explorer(bytes, as_told.measured(), open, None)?;
+                let mut explorer = explorer(bytes, as_told.measured, open, None)?;
                 let outcome = play(&mut explorer, open.strategy, run);
                 let is_right = place(presented, out) == Some(outcome.identified);
                 Ok::<_, EvaluateError>((outcome.told, is_right))
@@ -170,7 +170,7 @@ fn episode(
     out: usize,
     bytes: &[u8],
 ) -> Result<[(VerdictKind, bool); SLIDES], EvaluateError> {
-    let mut explorer = explorer(bytes, experiment.measured(), config, None)?;
+    let mut explorer = explorer(bytes, experiment.measured, config, None)?;
     let place = place(run.unknown, out);
     let mut told = [(VerdictKind::Undecided, false); SLIDES];
     for told in &mut told {

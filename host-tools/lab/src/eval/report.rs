@@ -184,7 +184,7 @@ impl Report {
             ..Config::default()
         };
         let measured = whole.iter().flat_map(|texture| &texture.slides);
-        let measured = measured.fold(experiment.measured(), |set, s| {
+        let measured = measured.fold(experiment.measured, |set, s| {
             set.and(s.measurement.properties.measured())
         });
         let explorer = explorer(table.as_bytes(), measured, config, None)?;

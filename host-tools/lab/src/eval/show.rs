@@ -10,6 +10,7 @@ use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::{Event, Prompt};
 
 use crate::eval::samples;
+use crate::eval::table_summary::TableSummary;
 pub use tactus_link::say::{count, day, percent};
 
 const BAR: usize = 24;
@@ -410,6 +411,7 @@ fn show_samples(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
 
 /// Prints a fused table: whitened means are meaningless to people, distances between them are not.
 fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
+    let textures = TableSummary::new(table).textures;
     for (movement, index) in table.movements().zip(0..) {
         writeln!(out, "\nmovement {}: {movement}", index + 1)?;
         writeln!(
@@ -417,25 +419,14 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
             "{:>4} {:<24} {:>6}  {:>7} {:>4} {:>6}  {:>6}  most like",
             "no.", "texture", "trials", "factory", "user", "itself", "sd off"
         )?;
-        for (name, texture) in table.names().zip(0..) {
-            let tally = table.tally(texture);
+        for (number, texture) in (1..).zip(&textures) {
+            let (name, known) = (&texture.name, &texture.movements[index]);
             write!(
                 out,
-                "{:>4} {name:<24} {:>6}  {:>7} {:>4} {:>6}",
-                texture + 1,
-                table.trials(texture, index),
-                tally.factory,
-                tally.user,
-                tally.itself
+                "{number:>4} {name:<24} {:>6}  {:>7} {:>4} {:>6}",
+                known.trials, texture.slides_factory, texture.slides_user, texture.slides_itself
             )?;
-            let others = table
-                .names()
-                .zip(0..)
-                .filter(|&(_, other)| other != texture);
-            let nearest = others
-                .filter_map(|(name, other)| Some((apart(table, index, [texture, other])?, name)))
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            match nearest {
+            match known.nearest_sd.zip(known.nearest.as_ref()) {
                 Some((sd, other)) => writeln!(out, "  {sd:>6.1}  {other}")?,
                 None => writeln!(out, "  {:>6}  -", "-")?,
             }

@@ -33,7 +33,6 @@ pub struct TableSummary {
 
 /// A movement of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-/// A movement of the table.
 pub struct MovementSummary {
     force_n: f32,
     speed_mm_s: f32,
@@ -41,7 +40,7 @@ pub struct MovementSummary {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(crate) struct TextureSummary {
-    name: String,
+    pub(super) name: String,
     /// Slides from which it was learned: from the factory, from a user, and by the probe itself.
     pub(crate) slides_factory: u32,
     /// See [`Self::slides_factory`].
@@ -51,12 +50,12 @@ pub(crate) struct TextureSummary {
     /// True if its sample was moved or turned between trials; `null` if unknown.
     sample_moved: Option<bool>,
     /// Its statistics at each movement, in the order of the movements.
-    movements: Vec<KnownSummary>,
+    pub(super) movements: Vec<KnownSummary>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub(crate) struct KnownSummary {
-    trials: u8,
+    pub(super) trials: u8,
     /// Mean and standard deviation; `null` where it was not learned, as in a table of whitened features.
     traction_n: Option<[f32; 2]>,
     /// Mean and standard deviation of the logarithm.
@@ -64,7 +63,7 @@ pub(crate) struct KnownSummary {
     /// Mean and standard deviation of the logarithm.
     pub(crate) fineness_ln: Option<[f32; 2]>,
     /// The texture that is most like it here, in a table of whitened features.
-    nearest: Option<String>,
+    pub(super) nearest: Option<String>,
     /// Distance of the two, in standard deviations within a texture.
     pub(crate) nearest_sd: Option<f32>,
 }

@@ -101,7 +101,7 @@ pub fn verify(
         open: true,
         ..config
     };
-    let textures = experiment.names().len();
+    let textures = experiment.names.len();
     let episodes: Vec<Vec<Episode>> = (0..runs)
         .into_par_iter()
         .panic_fuse()
@@ -152,7 +152,7 @@ fn episode(
     reference: usize,
 ) -> Result<Episode, VerifyError> {
     let candidates = [reference as u16];
-    let mut explorer = explorer(bytes, experiment.measured(), config, Some(&candidates))?;
+    let mut explorer = explorer(bytes, experiment.measured, config, Some(&candidates))?;
     let mut episode = Episode {
         is_same: run.unknown == reference,
         scores: [0.0; SLIDES],
@@ -165,7 +165,7 @@ fn episode(
         let action = explorer.choose(&[], 0);
         let Some(slide) = run.slide(action.movement.into()) else {
             missing += 1;
-            if !explorer.reject(action) || missing == 2 * experiment.movements().len() {
+            if !explorer.reject(action) || missing == 2 * experiment.movements.len() {
                 break;
             }
             continue;
@@ -419,7 +419,7 @@ mod tests {
             };
             let bytes = with.as_bytes();
             let mut explorer =
-                explorer(bytes, experiment.measured(), config, Some(&[reference])).unwrap();
+                explorer(bytes, experiment.measured, config, Some(&[reference])).unwrap();
             assert_eq!(explorer.verification(), None);
             for slide in slides {
                 let at = with.movements().position(|m| m == slide.movement).unwrap();

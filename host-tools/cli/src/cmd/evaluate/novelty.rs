@@ -36,13 +36,13 @@ pub(crate) fn leave_one_out(
 ) -> anyhow::Result<()> {
     // a texture that is known is presented while another is left out, and limits take three
     ensure!(
-        experiment.names().len() >= 4,
+        experiment.names.len() >= 4,
         "--novelty needs 4 textures or more: record more of them"
     );
     let novelty = with_progress(args.runs(), "presenting new textures", |done| {
         novelty::leave_one_out(experiment, config, args.runs(), done)
     })?;
-    let (train_slides, runs, seed) = (experiment.train_slides(), args.runs(), args.seed);
+    let (train_slides, runs, seed) = (experiment.train_slides, args.runs(), args.seed);
     if args.format == Format::Json {
         let figures = NoveltyFigures {
             method: args.method,

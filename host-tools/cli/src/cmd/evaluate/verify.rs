@@ -36,7 +36,7 @@ pub(super) fn run(
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     ensure!(
-        experiment.names().len() >= 4,
+        experiment.names.len() >= 4,
         "--verify needs four textures or more: record more of them"
     );
     let verified = with_progress(args.runs(), "holding slides against references", |done| {
@@ -45,7 +45,7 @@ pub(super) fn run(
     let figures = Figures {
         method: args.method,
         protocol,
-        train_slides: experiment.train_slides(),
+        train_slides: experiment.train_slides,
         runs: args.runs(),
         seed: args.seed,
         verified,
