@@ -221,7 +221,8 @@ fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<
 /// Runs every test with every seed, the ignored ones too, but for those that are a part of their own.
 fn left_out() -> Result<String> {
     let mut passed = 0;
-    let mut board = emulate::emulator("test");
+    let mut board = emulate::everything("test");
+    board.args(["--test", "board"]);
     emulate::with_images(&mut board, &firmware::elves()?)?;
     for mut tests in [emulate::workspace("test"), board] {
         tests.args(["--no-fail-fast", "--", "--include-ignored"]);

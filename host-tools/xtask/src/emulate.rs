@@ -85,18 +85,18 @@ pub(crate) fn program(run: &str) -> Command {
     emulator
 }
 
+/// Builds the emulator as the board's tests do, by [`everything`]: its own features would compile all below it again.
 pub(crate) fn build() -> Command {
-    let mut build = emulator("build");
-    build.args(["--bin", "tactus-emulator"]);
+    let mut build = everything("test");
+    build.args(["--test", "board", "--no-run"]);
     build
 }
 
-/// A cargo command on the emulator alone. rigless declares Rust 1.98, and cranelift below it 1.96: they build with
+/// A cargo command on the whole workspace. rigless declares Rust 1.98, and cranelift below it 1.96: they build with
 /// 1.95, which the README names, and these tests are run with that.
-pub(crate) fn emulator(command: &str) -> Command {
+pub(crate) fn everything(command: &str) -> Command {
     let mut cargo = cargo();
-    cargo.args([command, "--package", "tactus-emulator"]);
-    cargo.args(["--locked", "--ignore-rust-version"]);
+    cargo.args([command, "--workspace", "--locked", "--ignore-rust-version"]);
     cargo
 }
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 
-use crate::emulate::{emulator, workspace};
+use crate::emulate::{everything, workspace};
 use crate::shell::{SKIP_LOG, cargo, has_subcommand, hear, root, run, skip, target};
 use crate::toolchain::{self, CHIP};
 use crate::{bench, campaign, emulate, firmware, page, python, size};
@@ -53,18 +53,16 @@ fn formatting() -> Result<()> {
 }
 
 fn lints() -> Result<()> {
-    let lints = ["--all-targets", "--", "-Dwarnings"];
-    announce(workspace("clippy").args(lints))?;
-    announce(emulator("clippy").args(lints))
+    announce(everything("clippy").args(["--all-targets", "--", "-Dwarnings"]))
 }
 
 fn documentation() -> Result<()> {
-    let mut doc = cargo();
-    doc.args(["doc", "--no-deps", "--locked"]);
-    for library in ["core", "link", "world", "lab", "study"] {
-        doc.args(["--package", &format!("tactus-{library}")]);
-    }
-    announce(doc.env("RUSTDOCFLAGS", "-Dwarnings"))
+    // of all of them: other features than those of the lints would have every crate below checked again
+    let mut doc = everything("doc");
+    announce(
+        doc.args(["--no-deps", "--lib"])
+            .env("RUSTDOCFLAGS", "-Dwarnings"),
+    )
 }
 
 /// Checks every workspace with cargo-deny.
@@ -97,8 +95,8 @@ fn licences() -> Result<()> {
 }
 
 fn board() -> Result<()> {
-    let mut board_tests = emulator("test");
-    board_tests.arg("--no-fail-fast");
+    let mut board_tests = everything("test");
+    board_tests.args(["--test", "board", "--no-fail-fast"]);
     tests(emulate::with_images(&mut board_tests, &firmware::elves()?)?)
 }
 

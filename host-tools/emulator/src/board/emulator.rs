@@ -439,7 +439,7 @@ impl Emulator {
         })
     }
 
-    /// Instructions of all handlers since [`Emulator::count_handlers`].
+    /// Instructions of all handlers since they are counted.
     pub fn handlers(&mut self) -> Result<u64, Error> {
         self.with(|standing| {
             let profiler = standing.driver.profiler.as_ref();
