@@ -11,7 +11,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, ensure};
 use clap::{Args, ValueEnum};
 
-use crate::shell::{hear, root, run};
+use crate::shell::{cargo, hear, root, run};
 use crate::{emulate, firmware};
 pub(crate) use factory::{FOLDER, TABLES};
 pub(crate) use fuzz::limits;
@@ -221,8 +221,9 @@ fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<
 /// Runs every test with every seed, the ignored ones too, but for those that are a part of their own.
 fn left_out() -> Result<String> {
     let mut passed = 0;
-    let mut board = emulate::everything("test");
-    board.args(["--test", "board"]);
+    let mut board = cargo();
+    board.args(["test", "--package", "tactus-emulator"]);
+    board.args(["--locked", "--ignore-rust-version"]);
     emulate::with_images(&mut board, &firmware::elves()?)?;
     for mut tests in [emulate::workspace("test"), board] {
         tests.args(["--no-fail-fast", "--", "--include-ignored"]);
