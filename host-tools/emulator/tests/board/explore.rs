@@ -6,10 +6,9 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tactus_core::wire::{Event, Identify, Report};
 use tactus_emulator::host::exploration::explore;
-use tactus_emulator::host::under_finger::{self, FirmwareData, Unknown};
+use tactus_emulator::host::under_finger::{self, FirmwareData};
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::sim::collection::Collection;
-use tactus_world::world::Setup;
 
 use crate::common::{boot, elf};
 
@@ -22,48 +21,6 @@ pub(crate) fn world() -> &'static (Collection, FirmwareData) {
             under_finger::simulated(&collection, Method::Fused.method(), &[], || ()).unwrap();
         (collection, known)
     })
-}
-
-fn identify(among: &[u16], threshold: f32) -> Identify {
-    Identify {
-        among: among.iter().copied().collect(),
-        threshold,
-        max_slides: 10,
-        method: None,
-        strategy: Default::default(),
-        open: true,
-        learn: false,
-        seed: 11,
-        false_alarm: None,
-    }
-}
-
-#[test]
-#[ignore = "long"]
-fn two_textures_that_change_places_change_the_verdicts() {
-    let Some(elf) = elf() else { return };
-    let (collection, known) = world();
-    let pair = [1, 2];
-    for mounted in pair {
-        let texture = collection.textures[usize::from(mounted)];
-        // all but the texture is the same
-        let setup = Setup {
-            texture,
-            ..collection.setup(collection.textures[1], 1)
-        };
-        let unknown = Unknown {
-            setup,
-            ..under_finger::mounted(collection, texture, 1)
-        };
-        let mut talk = boot(&elf, &unknown, None);
-        talk.teach(&known.calibration, &known.table, |_, _| ())
-            .unwrap();
-        let asked = identify(&pair, 0.999);
-        let explored = explore(&mut talk, &known.table, asked, &unknown.name, |_, _| ()).unwrap();
-        assert_eq!(explored.missed(), [""; 0]);
-        assert!(explored.right() && explored.found.sure, "{explored:?}");
-        assert_eq!(explored.found.texture, mounted);
-    }
 }
 
 #[test]
@@ -79,7 +36,10 @@ fn garbage_on_the_line_is_reported_and_never_believed() {
     random.fill_bytes(&mut garbage);
     let mut pieces = garbage.chunks(400);
     let (mut exploring, mut damaged, mut answers) = (false, 0, 0);
-    let asked = identify(&[], 0.99);
+    let asked = Identify {
+        seed: 11,
+        ..Identify::default()
+    };
     let explored = explore(
         &mut talk,
         &known.table,
