@@ -45,12 +45,13 @@ pub(crate) fn ready(talk: &mut Talk) {
 }
 
 /// CRC-32 (ISO-HDLC), bit by bit.
-fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, byte| {
+pub(crate) fn crc32(bytes: &[u8]) -> [u8; 4] {
+    let crc = !bytes.iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
             (crc >> 1) ^ (0xEDB8_8320 & 0u32.wrapping_sub(crc & 1))
         })
-    })
+    });
+    crc.to_le_bytes()
 }
 
 /// The table with the limits of changed textures from here on, whatever they were; its checksum is right.
@@ -64,7 +65,7 @@ pub(crate) fn with_limits_of_change(table: &[u8], begin: f32) -> Vec<u8> {
     }
     let end = bytes.len() - 4;
     let crc = crc32(&bytes[..end]);
-    bytes[end..].copy_from_slice(&crc.to_le_bytes());
+    bytes[end..].copy_from_slice(&crc);
     bytes
 }
 

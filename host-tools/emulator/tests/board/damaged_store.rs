@@ -20,7 +20,7 @@ use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_link::{PushTable, ReadTable, Request};
 
 use crate::broken_code::{Instead, break_code};
-use crate::common::{elf, unpacked};
+use crate::common::{crc32, elf, unpacked};
 
 fn store() -> Vec<u8> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -146,15 +146,6 @@ fn a_damaged_table_is_reported_and_not_replaced_in_silence() {
     assert_eq!((table(&mut talk), told), (older, Vec::new()));
 }
 
-/// CRC-32 (ISO-HDLC), bit by bit.
-fn crc(bytes: &[u8]) -> [u8; 4] {
-    let of_byte = |crc: u32, byte: &u8| {
-        let step = |crc: u32, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
-        (0..8).fold(crc ^ u32::from(*byte), step)
-    };
-    (!bytes.iter().fold(!0, of_byte)).to_le_bytes()
-}
-
 /// A table of nonsense with a right checksum: far too many textures, or bytes of `good` that are others.
 fn nonsense(random: &mut ChaCha8Rng, good: &[u8]) -> Vec<u8> {
     let mut table = if random.random() {
@@ -187,7 +178,7 @@ fn nonsense(random: &mut ChaCha8Rng, good: &[u8]) -> Vec<u8> {
     };
     let length = table.len() as u32 + 4;
     table[8..12].copy_from_slice(&length.to_le_bytes());
-    let checksum = crc(&table);
+    let checksum = crc32(&table);
     table.extend(checksum);
     table
 }
@@ -200,7 +191,7 @@ fn holding(table: &[u8]) -> Vec<u8> {
     let mut slot = b"SLOT\x01\0\0\0\xff\xff\0\0".to_vec();
     slot.extend((table.len() as u32).to_le_bytes());
     slot.extend(&table[table.len() - 4..]);
-    slot.extend(crc(&slot));
+    slot.extend(crc32(&slot));
     slot.extend([0xff; 4]);
     slot.extend(b"COMM");
     slot.extend(table);
