@@ -298,3 +298,111 @@ fn a_first_look_writes_what_can_be_corrected() {
         &["no file in it ends with wav"],
     );
 }
+
+/// Whatever files and settings say, one sentence says what is wrong, and nothing is written.
+#[test]
+fn hostile_files_settings_and_names_are_refused() {
+    let table = |name: &str| {
+        let mut text = "time,x,what\n".to_owned();
+        for (n, x) in recording(0, 0, 500.0, 1.0).iter().enumerate() {
+            let _ = writeln!(text, "{:.3},{x:.5},{name}", n as f64 / 500.0);
+        }
+        text
+    };
+    let stars = format!("texture = \"{}\"", "*".repeat(60_000));
+    let settings = [
+        (stars.as_str(), "--texture has more than 256 bytes"),
+        ("length = inf", "slides of inf s"),
+        ("length = 1e300", "--length is more than 0"),
+        ("gain = nan", "a gain of NaN is impossible"),
+        ("gain = 1e-320", "is impossible"),
+        ("force = nan\nspeed = 20", "force"),
+        ("rate = inf", "a rate of inf Hz"),
+        ("window = \"0,1e999\"", "is not FROM,TO"),
+        ("texture = \"what\"\nfinger = \"a\\u001b[31mb\"", "U+001B"),
+        (
+            "finger = \"0123456789012345678901234567890123456789more\"",
+            "40",
+        ),
+        ("session = \"\\u202emonday\"", "U+202E"),
+        ("channel = \"2\"\nrate = [1", "import.toml: line 2"),
+    ];
+    for (settings, why) in settings {
+        let at = Scratch::new();
+        at.write("data/felt/1.csv", table("felt"));
+        at.write("data/import.toml", settings);
+        assert_says(&at.error("import data recordings", 1), &[why]);
+        assert!(!at.path("recordings").exists(), "{why}");
+    }
+    let packed = |bytes: &[u8]| {
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packed.write_all(bytes).unwrap();
+        packed.finish().unwrap()
+    };
+    let zeros = npy("|u1", "13000000,", &vec![0; 13_000_000]);
+    let labels: String = (0..3000)
+        .map(|n| format!("{n},{},word {n}\n", n % 7))
+        .collect();
+    let files = [
+        (
+            "felt/1.csv.gz",
+            packed(&vec![b'1'; 40 << 20]),
+            "unpacks to more than 32 MB",
+        ),
+        (
+            "felt/1.npy.gz",
+            packed(&zeros),
+            "more than 12 million numbers",
+        ),
+        (
+            "felt/1.wav",
+            {
+                let mut cut = wav(2200, 16, &[&[0.5; 99]]);
+                cut.truncate(99);
+                cut
+            },
+            "damaged WAV",
+        ),
+        (
+            "felt/1.csv",
+            b"1e308,2\n-1e308,1\n".repeat(600),
+            "not a number that was measured",
+        ),
+        ("felt/1.csv", labels.into_bytes(), "too many words"),
+        ("felt/1.csv", vec![b','; 2 << 20], "no row of a table"),
+        (
+            "\u{1b}]0;title\u{7}/1.csv",
+            table("felt").into_bytes(),
+            "U+001B",
+        ),
+        ("felt/1.csv", table("si\u{202e}lk").into_bytes(), "U+202E"),
+    ];
+    for (name, bytes, why) in files {
+        let at = Scratch::new();
+        at.write(&format!("data/{name}"), bytes);
+        let column = if name.contains('\u{1b}') {
+            ""
+        } else {
+            "--texture 3"
+        };
+        let named = if why == "U+202E" {
+            "--texture what"
+        } else {
+            column
+        };
+        let said = at.error(&format!("import data recordings --rate 500 {named}"), 1);
+        assert_says(&said, &[why]);
+        assert!(
+            !said.contains('\u{1b}') && !at.path("recordings").exists(),
+            "{said}"
+        );
+    }
+    // settings stay in their folder
+    let at = Scratch::new();
+    at.write("data/felt/1.csv", table("felt"));
+    at.write("elsewhere.toml", "secret = 1");
+    std::os::unix::fs::symlink(at.path("elsewhere.toml"), at.path("data/import.toml")).unwrap();
+    let said = at.error("import data recordings", 1);
+    assert_says(&said, &["leads out of this folder"]);
+    assert!(!said.contains("secret"), "{said}");
+}

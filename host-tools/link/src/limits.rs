@@ -89,6 +89,8 @@ fn longest_s(command: &Command, movements: Option<usize>) -> u32 {
         Command::Home => TRIES * MOVEMENT_S,
         // the motor runs without load at four speeds, there and back
         Command::Calibrate => 8 * MOVEMENT_S,
+        // the probe waits 30 s for a press of its button
+        Command::SetHighForce(true) => 30 + ANSWER_S,
         Command::Weigh(_) | Command::TurnOver => PERSON_S,
         command if is_of_table(command) => TABLE_S,
         _ => ANSWER_S,

@@ -623,6 +623,67 @@ fn no_request_goes_on_without_an_end() {
     assert!(why.contains("the request ReadTable"), "{why}");
 }
 
+/// A probe waits for its button for 30 s: what to press is said once, and its own answer comes before any limit.
+#[test]
+fn high_forces_want_the_button_and_say_so() {
+    let time = Duration::from_secs(5);
+    let host = super::Probe::new("here", time, time);
+    let mut probe = Probe::default();
+    let status = wire::Status {
+        phase: Phase::Ready,
+        fault: None,
+        textures: 3,
+        table_bytes: 900,
+        table_crc: 7,
+        factory: false,
+        calibrated: 20_261_121,
+        counts: wire::Counts::default(),
+        skin_mj: (1, 1),
+        false_alarm: None,
+        // so that nobody is asked for mount or stop
+        high_force: true,
+        finger: FingerCode::BIOTAC,
+    };
+    let mut set = std::pin::pin!(super::operations::set_high_force(&host, true));
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    let mut waits = None;
+    for ms in (0..60_000).step_by(50) {
+        let mut says = Vec::new();
+        for byte in host.to_send() {
+            let Some(Ok(asked)) = probe.receiver.push::<wire::Request>(byte) else {
+                continue;
+            };
+            match asked.command {
+                Command::SetHighForce(true) => drop(waits.get_or_insert((asked.id, ms))),
+                _ => says.extend([Event::Status(status.clone()), Event::Done(asked.id)]),
+            }
+        }
+        if let Some((id, since)) = waits {
+            if (ms - since) % 1000 == 0 {
+                says.push(Event::Prompt(wire::Prompt::Button));
+            }
+            if ms - since == 30_000 {
+                let why = Failure::NotPressed;
+                says.push(Event::Refused { id, why });
+            }
+        }
+        let says: Vec<u8> = says
+            .into_iter()
+            .flat_map(|event| probe.event(event))
+            .collect();
+        host.carry(&says, Duration::from_millis(ms));
+        host.said();
+        if let Poll::Ready(done) = set.as_mut().poll(&mut context) {
+            let why = done.unwrap_err().to_string();
+            assert!(why.contains("nobody pressed the blue button"), "{why}");
+            let words = String::from_utf8(host.take_words()).unwrap();
+            assert_eq!(words.matches("press the blue button").count(), 1, "{words}");
+            return;
+        }
+    }
+    panic!("no end");
+}
+
 #[test]
 fn an_echo_is_none_of_another_version() {
     let requests = [

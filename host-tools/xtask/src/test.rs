@@ -75,9 +75,8 @@ fn licences() -> Result<()> {
         let mut deny = cargo();
         deny.args(["deny", "--workspace", "--manifest-path"]);
         deny.arg(root().join(folder).join("Cargo.toml"));
-        deny.args(task)
-            .arg("--config")
-            .arg(root().join("deny.toml"));
+        deny.arg("--config").arg(root().join("deny.toml"));
+        deny.args(task);
         deny
     };
     let mut kinds = vec!["bans", "licenses", "sources"];
@@ -89,7 +88,7 @@ fn licences() -> Result<()> {
         )?,
     }
     for folder in iter::once("").chain(OTHERS) {
-        announce(deny(folder, &["check", "--disable-fetch"]).args(&kinds))?;
+        announce(deny(folder, &["check"]).args(&kinds))?;
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use tactus_lab::eval::experiment::Experiment;
 use tactus_study::fabricslide::FabricSet;
 
 /// Between manifest and file.
-const RULE: &[u8] = b"\n---\n";
+pub(crate) const RULE: &[u8] = b"\n---\n";
 
 /// A folder of recordings in one of the formats, or a table of properties: the first byte says which.
 ///
@@ -101,10 +101,10 @@ fn opened(folder: &Path) -> Result<(), RecordingError> {
 }
 
 /// Gone at the end, in RAM where there is such a file system.
-struct Folder(std::path::PathBuf);
+pub(crate) struct Folder(pub(crate) std::path::PathBuf);
 
 impl Folder {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let root = [Path::new("/dev/shm"), &std::env::temp_dir()]
             .into_iter()
             .find(|root| root.is_dir())

@@ -6,6 +6,7 @@
 
 mod flash;
 mod folder;
+mod import;
 pub mod memory;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -26,6 +27,7 @@ use tactus_link::log::{Line, TableParts};
 
 pub use flash::{Flash, images};
 pub use folder::{many_rows, recordings};
+pub use import::{import, signals};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// More textures than any table for the probe has.
@@ -363,13 +365,15 @@ pub fn write_seeds(target: &str) {
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 9] = [
     ("wire", wire),
     ("table", table),
     ("store", store),
     ("recordings", recordings),
     ("log", log),
     ("samples", samples),
+    ("signals", signals),
+    ("import", import),
     ("page", page),
 ];
 
@@ -428,6 +432,8 @@ pub fn seeds(target: &str) -> Vec<Vec<u8>> {
             .map(|image| vec![image, 1, 0, 9, 4, 0, 3, 2, 1, 3, 7, 1, 0, 6, 0, 4, 0])
             .collect(),
         "recordings" => folder::seeds(),
+        "signals" => import::seeds(false),
+        "import" => import::seeds(true),
         "log" => vec![
             concat!(
                 r#"{"session":{"tactus":"0.2.0","protocol":PROTOCOL,"port":"x"}}"#,

@@ -1,5 +1,6 @@
 //! `tactus import`: recordings of others in the project's format.
 
+use std::collections::{BTreeSet, HashMap};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -172,24 +173,17 @@ fn tell(survey: &Survey, out: &mut impl Write) -> anyhow::Result<()> {
         "{:<40} {:>10} {:>8} {:>8}",
         "texture", "recordings", "slides", "sessions"
     )?;
+    let mut of: HashMap<&str, (usize, usize, BTreeSet<&str>)> = HashMap::new();
+    for found in &survey.found {
+        let (files, slides, sessions) = of.entry(&found.texture).or_default();
+        *files += 1;
+        *slides += found.slides.len();
+        sessions.extend([found.session.as_str()].iter().filter(|s| !s.is_empty()));
+    }
     for texture in &survey.textures {
-        let of: Vec<&Found> = survey
-            .found
-            .iter()
-            .filter(|f| f.texture == *texture)
-            .collect();
-        let slides: usize = of.iter().map(|f| f.slides.len()).sum();
-        let sessions: std::collections::BTreeSet<&str> = of
-            .iter()
-            .map(|f| f.session.as_str())
-            .filter(|s| !s.is_empty())
-            .collect();
-        writeln!(
-            out,
-            "{texture:<40} {:>10} {slides:>8} {:>8}",
-            of.len(),
-            sessions.len()
-        )?;
+        let (files, slides, sessions) = of.remove(texture.as_str()).unwrap_or_default();
+        let sessions = sessions.len();
+        writeln!(out, "{texture:<40} {files:>10} {slides:>8} {sessions:>8}")?;
     }
     Ok(())
 }

@@ -206,7 +206,8 @@ fn answers(elf: &Path, store: Vec<u8>, hangs: bool) -> (Talk, Status, usize) {
         ..Options::default()
     };
     let world = Collection::new(3, Vec::new(), 0);
-    let mut talk = Talk::new(mounted(&world, 31, 9).start(elf, options).unwrap());
+    let board = mounted(&world, 31, 9).start(elf, options).unwrap();
+    let mut talk = Talk::new(board).look_every(20);
     if hangs {
         break_code(talk.board(), "tactus_stored_table", Instead::Hangs);
     }

@@ -153,11 +153,12 @@ pub async fn set_false_alarm(probe: &Probe, share: Option<f32>) -> Result<()> {
     probe.get(Request::command(set)).await
 }
 
-/// Sets whether movements may press with up to 2 N, with the consent of somebody who knows mount and stop.
+/// Sets whether movements may press with up to 2 N, with the consent of somebody who knows mount and stop; a person
+/// presses the board's button where there is one.
 pub async fn set_high_force(probe: &Probe, on: bool) -> Result<()> {
     if on && !probe.hello().await?.high_force {
         confirm(probe, say::HIGH_FORCE.to_owned(), say::YIELDS).await?;
     }
     let set = Command::SetHighForce(on);
-    probe.get(Request::command(set)).await
+    probe.perform(Request::command(set)).await
 }

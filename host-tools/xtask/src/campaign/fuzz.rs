@@ -10,13 +10,15 @@ use clap::Parser;
 use crate::shell::{self, cargo, root, run, target};
 use crate::toolchain;
 
-const TARGETS: [&str; 7] = [
+const TARGETS: [&str; 9] = [
     "wire",
     "table",
     "store",
     "recordings",
     "log",
     "samples",
+    "signals",
+    "import",
     "page",
 ];
 const MAX_LEN: usize = 8192;

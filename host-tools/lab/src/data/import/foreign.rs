@@ -5,7 +5,6 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
@@ -15,6 +14,7 @@ use super::settings::{SETTINGS, Settings};
 use super::signals::Signals;
 use crate::data::quality::SlideChecks;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
+use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
 
 mod paths;
@@ -25,6 +25,8 @@ use reading::{How, liveliest, rounded};
 
 /// Largest value that the samples are made to have: 12 bits with a little room.
 const FULL: f64 = 2000.0;
+/// Smallest change of any sensor, in any unit.
+const SMALLEST: f64 = 1e-30;
 /// P_AC before the window, so that the filter has filled, in samples.
 const BEFORE: usize = 220;
 /// Longest still part that is kept, in samples.
@@ -95,23 +97,24 @@ impl Survey {
             from.parent().unwrap_or(from)
         };
         let settings = settings.with_file(folder)?;
+        let at = |why: String| RecordingError::at(from, why);
+        settings.check().map_err(at)?;
         let paths = files(from, &settings)?;
         let first = Signals::read(&folder.join(&paths[0].0))?;
-        let at = |why: String| RecordingError::at(from, why);
         let channel = match &settings.channel {
             Some(channel) => channel.clone(),
             None => liveliest(&first, &settings).map_err(at)?,
         };
         let how = How::new(&first, &settings).map_err(at)?;
         let done = std::sync::atomic::AtomicUsize::new(0);
-        let looked = paths.par_iter().map(|(path, named)| {
+        let memory = |(path, _): &(String, _)| Signals::memory(&folder.join(path));
+        let found = each_in_flight(&paths, memory, |(path, named)| {
             let signals = Signals::read(&folder.join(path))?;
             let found = how.look(path, named, &signals, &channel, &settings);
             let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             progress(done, paths.len());
             found.map_err(|why| RecordingError::at(&folder.join(path), why))
-        });
-        let found: Vec<Vec<Found>> = looked.collect::<Result<_>>()?;
+        })?;
         let found: Vec<Found> = found.into_iter().flatten().collect();
         let (gain, pressure) = gains(&found, &channel, &settings).map_err(at)?;
         let textures = textures(&found).map_err(at)?;
@@ -161,6 +164,8 @@ impl Survey {
             true => self.from.as_path(),
             false => self.from.parent().unwrap_or(&self.from),
         };
+        let places = self.textures.iter().zip(0..);
+        let places: HashMap<&String, usize> = places.collect();
         let mut numbers = vec![0_u32; self.textures.len()];
         let mut checks: Vec<SlideChecks> = numbers.iter().map(|_| SlideChecks::default()).collect();
         let mut left_out = Vec::new();
@@ -171,13 +176,15 @@ impl Survey {
             let at = |why: String| RecordingError::at(&path, why);
             let how = How::new(&signals, &self.settings).map_err(at)?;
             for found in parts {
-                let texture = self
-                    .textures
-                    .iter()
-                    .position(|t| *t == found.texture)
-                    .unwrap_or(0);
+                let texture = places.get(&found.texture).copied().unwrap_or(0);
                 writer.label(self.labels(found));
                 let pac = how.pac(&signals, &self.channel, found.rows.clone(), self.gain);
+                let ends = found.ranges.slides.iter().chain(&found.ranges.still);
+                if ends.map(|range| range.end).max().unwrap_or(0) > pac.len() {
+                    return Err(at(
+                        "has changed since it was looked at; import again".to_owned()
+                    ));
+                }
                 let slow = |column: &Option<String>, gain: Option<f64>| {
                     let both = column.as_ref().zip(gain);
                     let slow = both.map(|(column, gain)| how.slow(&signals, column, found, gain));
@@ -288,18 +295,25 @@ fn gains(
 ) -> std::result::Result<(f64, Option<f64>), String> {
     let peak = found.iter().map(|f| f.peak).fold(0.0, f64::max);
     let pressure = found.iter().map(|f| f.pressure).fold(0.0, f64::max);
-    if peak == 0.0 {
+    if peak < SMALLEST {
         return Err(format!(
             "channel {channel:?} never changes: is the sensor connected?"
         ));
     }
     let gain = match (settings.gain, settings.unit.as_deref()) {
-        (Some(gain), _) if gain.is_finite() && gain > 0.0 => gain,
-        (Some(gain), _) => return Err(format!("a gain of {gain} is impossible")),
+        (Some(gain), _) if gain.is_normal() && gain > 0.0 => gain,
+        (Some(gain), _) => {
+            return Err(format!(
+                "a gain of {gain} is impossible; give counts per unit"
+            ));
+        }
         (None, Some("counts")) => 1.0,
         (None, _) => rounded(FULL / peak),
     };
-    Ok((gain, (pressure > 0.0).then(|| rounded(FULL / pressure))))
+    Ok((
+        gain,
+        (pressure > SMALLEST).then(|| rounded(FULL / pressure)),
+    ))
 }
 
 /// The textures in the order of their first file; each has a slide.

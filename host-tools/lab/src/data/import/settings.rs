@@ -4,11 +4,14 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::data::recordings::files::confined;
 use crate::data::recordings::{RecordingError, Result, read_bounded};
 
 /// Name of the file of settings in the folder of the data.
 pub const SETTINGS: &str = "import.toml";
 const MAX_SETTINGS: u64 = 64 << 10;
+/// Longest slide that is asked for, s: longer than any slow sensor needs.
+const MAX_LENGTH_S: f64 = 3600.0;
 
 /// Settings of an import; what is `None` is found by looking at the data.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -116,6 +119,7 @@ impl Settings {
         if !path.is_file() {
             return Ok(self);
         }
+        confined(folder, &path)?;
         let bytes = read_bounded(&path, MAX_SETTINGS)?;
         let text = String::from_utf8(bytes).map_err(|why| RecordingError::at(&path, why))?;
         let file: Self = toml::from_str(&text).map_err(|why| {
@@ -158,6 +162,21 @@ impl Settings {
         head.to_owned() + &lines.collect::<String>()
     }
 
+    /// Refuses what no file can be read with.
+    pub(super) fn check(&self) -> std::result::Result<(), String> {
+        if self.texture.as_ref().is_some_and(|t| t.len() > MAX_PATTERN) {
+            return Err(format!(
+                "--texture has more than {MAX_PATTERN} bytes; give a column, or a shorter pattern"
+            ));
+        }
+        match self.length {
+            Some(length) if !(length > 0.0 && length <= MAX_LENGTH_S) => Err(format!(
+                "slides of {length} s; --length is more than 0, and {MAX_LENGTH_S} at most"
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Sliding from and to, s.
     pub(super) fn window(&self) -> std::result::Result<Option<(f64, f64)>, String> {
         let Some(window) = &self.window else {
@@ -180,45 +199,95 @@ pub(super) struct Named {
     pub session: String,
 }
 
-/// The parts of a path by a pattern such as `{session}/{texture}_*.wav`; a star stands for anything but a slash.
-pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
-    fn go(pattern: &str, path: &str, mut named: Named) -> Option<Named> {
-        let (field, rest) = if let Some(rest) = pattern.strip_prefix('*') {
-            ("", rest)
-        } else if let Some((field, rest)) = pattern
-            .strip_prefix('{')
-            .and_then(|rest| rest.split_once('}'))
-        {
-            (field, rest)
-        } else {
-            let Some(wanted) = pattern.chars().next() else {
-                return path.is_empty().then_some(named);
-            };
-            let rest = path.strip_prefix(wanted)?;
-            return go(&pattern[wanted.len_utf8()..], rest, named);
+/// Longest pattern of paths, bytes.
+pub(super) const MAX_PATTERN: usize = 256;
+
+/// A part of a pattern.
+enum Part<'p> {
+    Letter(char),
+    /// The first letter of a field of this name.
+    Field(&'p str),
+    /// Letters up to what comes next, or none.
+    Rest,
+}
+
+/// A pattern beside a path.
+struct Match<'p> {
+    parts: Vec<Part<'p>>,
+    path: Vec<char>,
+    /// Where in the path each part begins.
+    begins: Vec<usize>,
+    /// By part and place: from there on it does not fit. Without it, stars would take a time that has no end.
+    failed: Vec<bool>,
+}
+
+impl Match<'_> {
+    /// True if the parts from this one on are the path from this place on; fields and stars are as short as can be.
+    fn fits(&mut self, part: usize, at: usize) -> bool {
+        let Some(kind) = self.parts.get(part) else {
+            return at == self.path.len();
         };
-        // the shortest that fits, at least one letter for a field
-        let ends = path.char_indices().map(|(at, _)| at).chain([path.len()]);
-        for end in ends {
-            let (value, after) = path.split_at(end);
-            if value.contains('/') {
-                return None;
-            }
-            if !field.is_empty() && value.is_empty() {
-                continue;
-            }
-            match field {
-                "texture" => value.clone_into(&mut named.texture),
-                "session" => value.clone_into(&mut named.session),
-                _ => {}
-            }
-            if let found @ Some(_) = go(rest, after, named.clone()) {
-                return found;
-            }
+        let state = part * (self.path.len() + 1) + at;
+        if self.failed[state] {
+            return false;
         }
-        None
+        let next = self.path.get(at).copied();
+        let is_name = next.is_some_and(|c| c != '/');
+        self.begins[part] = at;
+        let fits = match kind {
+            Part::Letter(letter) => next == Some(*letter) && self.fits(part + 1, at + 1),
+            Part::Field(_) => is_name && self.fits(part + 1, at + 1),
+            Part::Rest => self.fits(part + 1, at) || is_name && self.fits(part, at + 1),
+        };
+        self.failed[state] = !fits;
+        fits
     }
-    go(pattern, path, Named::default()).filter(|named| !named.texture.is_empty())
+}
+
+/// The parts of a path by a pattern such as `{session}/{texture}_*.wav`, of at most [`MAX_PATTERN`] bytes; a star stands
+/// for anything but a slash.
+pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
+    let mut parts = Vec::new();
+    let mut rest = pattern;
+    while let Some(letter) = rest.chars().next() {
+        let after = &rest[letter.len_utf8()..];
+        let field = if letter == '{' {
+            after.split_once('}')
+        } else {
+            None
+        };
+        rest = field.map_or(after, |(_, after)| after);
+        match field {
+            Some(("", _)) => parts.push(Part::Rest),
+            Some((name, _)) => parts.extend([Part::Field(name), Part::Rest]),
+            None if letter == '*' => parts.push(Part::Rest),
+            None => parts.push(Part::Letter(letter)),
+        }
+    }
+    let path: Vec<char> = path.chars().collect();
+    let mut found = Match {
+        begins: vec![path.len(); parts.len() + 1],
+        failed: vec![false; parts.len() * (path.len() + 1)],
+        parts,
+        path,
+    };
+    if !found.fits(0, 0) {
+        return None;
+    }
+    let mut named = Named::default();
+    for (at, part) in found.parts.iter().enumerate() {
+        let value = || {
+            found.path[found.begins[at]..found.begins[at + 2]]
+                .iter()
+                .collect()
+        };
+        match part {
+            Part::Field("texture") => named.texture = value(),
+            Part::Field("session") => named.session = value(),
+            _ => {}
+        }
+    }
+    Some(named).filter(|named| !named.texture.is_empty())
 }
 
 /// What a path says without a pattern: the folder is the texture, and one of a session above or below it; without
@@ -277,6 +346,23 @@ mod tests {
         );
         assert_eq!(matched("{texture}/*.wav", "a/b/c.wav"), None);
         assert_eq!(matched("{texture}*.csv", "é1.csv").unwrap().texture, "é");
+        let named = matched("{texture}_{session}", "a_b_c").unwrap();
+        assert_eq!(
+            (named.texture.as_str(), named.session.as_str()),
+            ("a", "b_c")
+        );
+        let ends = matched("x{texture}", "xsilk").unwrap();
+        assert_eq!(ends.texture, "silk");
+    }
+
+    #[test]
+    fn a_pattern_of_many_stars_ends() {
+        let began = std::time::Instant::now();
+        let stars = "{texture}".to_owned() + &"*a".repeat(120) + "b";
+        assert_eq!(matched(&stars, &"a".repeat(255)), None);
+        let path = "a".repeat(200) + "b";
+        assert_eq!(matched(&stars, &path).unwrap().texture, "a");
+        assert!(began.elapsed().as_secs() < 2);
     }
 
     #[test]

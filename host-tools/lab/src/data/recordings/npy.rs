@@ -131,33 +131,56 @@ impl<'b> Header<'b> {
     }
 }
 
-/// An array of numbers of any kind.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Array {
-    /// Its shape.
-    pub shape: Vec<usize>,
-    /// Its elements in C's order.
-    pub data: Vec<f64>,
-}
-
-/// The array of a `.npy` file of integers or floats, of either byte order.
-/// Errors: It is none.
-pub fn read_any(bytes: &[u8]) -> Result<Array, String> {
+/// The channels of a `.npy` file of integers or floats, of either byte order: of one dimension one channel, of two the
+/// longer one is time. `fits` refuses more samples or channels than the caller takes.
+/// Errors: It is none, or refused.
+pub fn read_channels(
+    bytes: &[u8],
+    fits: impl Fn(usize, usize) -> Result<(), String>,
+) -> Result<Vec<Vec<f64>>, String> {
     let header = Header::of(bytes)?;
     let data = header.data;
     let big = header.kind.starts_with('>');
+    let (rows, columns) = match header.shape[..] {
+        [samples] => (samples, 1),
+        [rows, columns] => (rows, columns),
+        _ => {
+            let dimensions = header.shape.len();
+            return Err(format!(
+                "an array of {dimensions} dimensions; save one or two"
+            ));
+        }
+    };
+    // a recording is longer than it has channels
+    let by_row = rows >= columns || header.shape.len() == 1;
+    let (samples, channels) = if by_row {
+        (rows, columns)
+    } else {
+        (columns, rows)
+    };
     macro_rules! elements {
         ($number:ty) => {{
             let (elements, rest) = data.as_chunks::<{ size_of::<$number>() }>();
-            let number = |bytes: &[u8; size_of::<$number>()]| match big {
-                true => <$number>::from_be_bytes(*bytes) as f64,
-                false => <$number>::from_le_bytes(*bytes) as f64,
+            if !rest.is_empty() || rows.checked_mul(columns) != Some(elements.len()) {
+                return Err("its header says another number of elements; save it again".to_owned());
+            }
+            fits(samples, channels)?;
+            let number = |sample: usize, channel: usize| {
+                // the first index is the slow one in C's order
+                let at = match by_row != header.fortran {
+                    true => sample * channels + channel,
+                    false => channel * samples + sample,
+                };
+                match big {
+                    true => <$number>::from_be_bytes(elements[at]) as f64,
+                    false => <$number>::from_le_bytes(elements[at]) as f64,
+                }
             };
-            let all: Vec<f64> = elements.iter().map(number).collect();
-            rest.is_empty().then_some(all)
+            let channel = |channel| (0..samples).map(|sample| number(sample, channel)).collect();
+            (0..channels).map(channel).collect()
         }};
     }
-    let all = match header.kind.trim_start_matches(['<', '>', '|', '=']) {
+    Ok(match header.kind.trim_start_matches(['<', '>', '|', '=']) {
         "i1" => elements!(i8),
         "u1" => elements!(u8),
         "i2" => elements!(i16),
@@ -173,20 +196,6 @@ pub fn read_any(bytes: &[u8]) -> Result<Array, String> {
                 "an array of {kind:?}; save one of integers or floats"
             ));
         }
-    };
-    let wanted = header
-        .shape
-        .iter()
-        .try_fold(1_usize, |n, length| n.checked_mul(*length));
-    let all = all.filter(|all| Some(all.len()) == wanted);
-    let mut data = all.ok_or("its header says another number of elements; save it again")?;
-    if let (true, &[rows, columns]) = (header.fortran, &header.shape[..]) {
-        let by_row = (0..rows * columns).map(|n| data[n % columns * rows + n / columns]);
-        data = by_row.collect();
-    }
-    Ok(Array {
-        shape: header.shape,
-        data,
     })
 }
 

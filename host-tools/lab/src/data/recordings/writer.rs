@@ -10,10 +10,11 @@ use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use tactus_core::sensor::FingerCode;
+use tactus_core::table::valid_name;
 
 use super::files::{
     BIOTAC_MANIFEST, INCOMPLETE, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,
-    distinct_textures, inside, open, read_bounded, sha256,
+    check_text, distinct_textures, inside, open, read_bounded, sha256,
 };
 use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
@@ -60,6 +61,9 @@ impl RecordingWriter {
 
     fn begin_in(folder: &Path, made: bool, textures: Vec<Texture>, note: &str) -> Result<Self> {
         distinct_textures(&folder.join(MANIFEST), &textures)?;
+        for texture in &textures {
+            check_text(&folder.join(MANIFEST), "texture", &texture.name)?;
+        }
         fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
         let lock = Lock::take(&folder.join(LOCK)).map_err(|why| match why.kind() {
             ErrorKind::ResourceBusy => {
@@ -147,6 +151,23 @@ impl RecordingWriter {
         let place = format!("slide {}", slide.number);
         let texture = &self.textures[slide.texture];
         check(texture, slide, &manifest)?;
+        let labels = &self.labels;
+        if labels.finger == FingerCode::OTHER {
+            valid_name(&labels.sensor).map_err(|why| {
+                RecordingError::at(&manifest, format!("sensor {:?} {why}", labels.sensor))
+            })?;
+        }
+        let texts = [
+            &labels.lot,
+            &labels.operator,
+            &labels.note,
+            &labels.session,
+            &labels.run,
+        ];
+        for text in texts {
+            // what would not be read again
+            check_text(&manifest, &place, text)?;
+        }
         if self.has(slide.texture, slide.number) {
             return Err(RecordingError::twice(
                 &manifest,

@@ -79,14 +79,24 @@ impl How {
             ));
         }
         let all = self::channel(signals, channel)?;
+        if self.samples(all.len()) > MOST_SAMPLES {
+            let hours = self.samples(all.len()) / self.out_hz() / 3600.0;
+            return Err(format!("{hours:.1} h in one file; split it"));
+        }
         let gaps = match time(signals, settings)? {
             Some((_, times)) => rate_of(&times)?.1,
             None => Vec::new(),
         };
         let stretches = stretches(signals, settings, named, all.len())?.into_iter();
         let found = stretches.map(|(texture, rows)| {
-            let out = self.resampled(&all[rows.clone()]);
-            let mut ranges = self.ranges(&out, settings)?;
+            // a stretch that is too short for a slide is not looked at: of a column of words there may be many
+            let (out, mut ranges) = if self.samples(rows.len()) < LEAST as f64 {
+                (about(&all[rows.clone()]), Parts::default())
+            } else {
+                let out = self.resampled(&all[rows.clone()]);
+                let ranges = self.ranges(&out, settings)?;
+                (out, ranges)
+            };
             let there = ranges.slides.len();
             let scale = out.len() as f64 / rows.len() as f64;
             let inside = gaps.iter().filter_map(|gap| gap.checked_sub(rows.start));
@@ -152,13 +162,16 @@ impl How {
         f64::from(PAC_RATE_HZ) / self.stretch()
     }
 
+    /// Samples of P_AC that so many rows become.
+    fn samples(&self, rows: usize) -> f64 {
+        rows as f64 * self.out_hz() / self.rate_hz
+    }
+
     /// The signal about its mean, at 2200 Hz.
     fn resampled(&self, samples: &[f64]) -> Vec<f64> {
-        let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
-        let about: Vec<f64> = samples.iter().map(|x| x - mean).collect();
         match self.from_hz {
-            Some(from_hz) => resample(&about, from_hz, PAC_RATE_HZ),
-            None => about,
+            Some(from_hz) => resample(&about(samples), from_hz, PAC_RATE_HZ),
+            None => about(samples),
         }
     }
 
@@ -198,6 +211,12 @@ impl How {
     }
 }
 
+/// A signal about its mean.
+fn about(samples: &[f64]) -> Vec<f64> {
+    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    samples.iter().map(|x| x - mean).collect()
+}
+
 /// The samples of a channel.
 fn channel<'s>(signals: &'s Signals, wanted: &str) -> std::result::Result<&'s [f64], String> {
     signals
@@ -226,11 +245,14 @@ fn stretches(
     };
     let words = signals.words.iter().find(|(name, _)| name == column);
     let (_, words) = words.ok_or_else(|| format!("no column of words {column:?}"))?;
-    let mut at = 0;
-    let runs = words.chunk_by(|a, b| a == b).map(|run| {
-        at += run.len();
-        (run[0].clone(), at - run.len()..at)
-    });
+    if words.is_empty() {
+        return Err(format!(
+            "column {column:?} has too many words for names of textures; name another by --texture"
+        ));
+    }
+    let begins = [0].into_iter().chain(words.iter().map(|(_, end)| *end));
+    let runs = words.iter().zip(begins);
+    let runs = runs.map(|((word, end), begin)| (word.clone(), begin..*end));
     Ok(runs.filter(|(word, _)| !word.is_empty()).collect())
 }
 
@@ -247,6 +269,8 @@ fn span(values: &[f64]) -> f64 {
 
 /// Fewest samples of a slide: spectra of some frames.
 const LEAST: usize = 1100;
+/// Most samples of P_AC of a file: two hours.
+const MOST_SAMPLES: f64 = 7200.0 * PAC_RATE_HZ as f64;
 
 /// The file's column of time, in s.
 fn time(

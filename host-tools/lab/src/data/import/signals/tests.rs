@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::*;
 use crate::data::cells;
 
@@ -27,7 +29,7 @@ t x~0 1.5~1 -2                     | blanks
         words.words,
         [(
             "what".to_owned(),
-            ["silk", "silk", "cork"].map(String::from).to_vec()
+            vec![("silk".to_owned(), 2), ("cork".to_owned(), 3)]
         )]
     );
 }
@@ -129,4 +131,69 @@ fn arrays_of_every_kind_are_read() {
             .unwrap_err()
             .contains("value 1 is NaN")
     );
+}
+
+#[test]
+fn words_come_with_where_they_end() {
+    let read = signals("x,what~1,a~2,a~3,~4,7~5,b~6,b").unwrap();
+    let runs = [("a", 2), ("", 3), ("7", 4), ("b", 6)].map(|(word, end)| (word.to_owned(), end));
+    assert_eq!(read.words, [("what".to_owned(), runs.to_vec())]);
+    // times of day name no textures
+    let rows: String = (0..2000).map(|n| format!("{n},{n}:00~")).collect();
+    assert_eq!(signals(&rows).unwrap().words, [("2".to_owned(), vec![])]);
+}
+
+proptest! {
+    /// A table of any numbers is read as it was written, with any mark between them and any decimal mark.
+    #[test]
+    fn tables_of_any_numbers_are_read(
+        numbers in proptest::collection::vec(-1e9..1e9_f64, 2..40),
+        columns in 1_usize..4,
+        mark in prop_oneof![Just(','), Just(';'), Just('\t'), Just(' ')],
+        comma in any::<bool>(),
+        quoted in any::<bool>(),
+    ) {
+        let comma = comma && mark != ',';
+        let text = |x: &f64| {
+            let text = format!("{x:.3}");
+            let text = if comma { text.replace('.', ",") } else { text };
+            if quoted { format!("\"{text}\"") } else { text }
+        };
+        let rows: Vec<&[f64]> = numbers.chunks_exact(columns).collect();
+        prop_assume!(rows.len() > 1);
+        let line = |row: &&[f64]| row.iter().map(text).collect::<Vec<_>>().join(&mark.to_string());
+        let file = rows.iter().map(line).collect::<Vec<_>>().join("\r\n");
+        // one column without a mark has its decimal comma as one
+        prop_assume!(columns > 1 || !comma);
+        let read = Signals::of(file.as_bytes()).unwrap();
+        prop_assert_eq!(read.channels.len(), columns);
+        for (at, (_, channel)) in read.channels.iter().enumerate() {
+            for (x, row) in channel.iter().zip(&rows) {
+                prop_assert!((x - row[at]).abs() <= 5.1e-4);
+            }
+        }
+    }
+
+    /// Bytes of any kind end in signals that are whole, or in a sentence.
+    #[test]
+    fn any_bytes_end(
+        kind in 0_usize..4,
+        at in 0_usize..200,
+        bytes in proptest::collection::vec(any::<u8>(), 0..64),
+    ) {
+        let heads: [&[u8]; 4] = [
+            b"",
+            b"RIFF\x40\0\0\0WAVEfmt \x10\0\0\0\x01\0\x02\0\x98\x08\0\0\x60\x22\0\0\x04\0\x10\0data\x10\0\0\0",
+            b"\x93NUMPY\x01\0\x36\0{'descr': '<i2', 'fortran_order': False, 'shape': (8,4)}\n",
+            b"t,x,what\n1,2,a\n2,3,a\n",
+        ];
+        let mut file = heads[kind].to_vec();
+        let at = at.min(file.len());
+        file.splice(at..(at + bytes.len() / 8).min(file.len()), bytes);
+        if let Ok(read) = Signals::of(&file) {
+            let samples = read.channels[0].1.len();
+            prop_assert!(samples > 1);
+            prop_assert!(read.channels.iter().all(|(_, all)| all.len() == samples));
+        }
+    }
 }

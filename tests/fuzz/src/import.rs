@@ -1,0 +1,156 @@
+//! Files of any sensor, as `tactus import` takes them.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use tactus_lab::data::import::foreign::Survey;
+use tactus_lab::data::import::settings::{SETTINGS, Settings};
+use tactus_lab::data::import::signals::Signals;
+use tactus_lab::data::recordings::{RecordingSet, npy};
+
+use crate::folder::{Folder, RULE};
+
+/// The bytes of a file: as they are, or packed, once to four times one after the other. The first byte says which.
+fn file(data: &[u8]) -> Vec<u8> {
+    let Some((&mode, body)) = data.split_first() else {
+        return Vec::new();
+    };
+    if mode & 1 == 0 {
+        return body.to_vec();
+    }
+    let mut packer = GzEncoder::new(Vec::new(), Compression::fast());
+    for _ in 0..=mode >> 1 & 3 {
+        packer.write_all(body).expect("memory");
+    }
+    packer.finish().expect("memory")
+}
+
+/// A file of signals.
+pub fn signals(data: &[u8]) {
+    let Ok(signals) = Signals::of(&file(data)) else {
+        return;
+    };
+    let samples = signals.channels[0].1.len();
+    for (_, channel) in &signals.channels {
+        assert_eq!(channel.len(), samples, "sampled together");
+        assert!(channel.iter().all(|x| x.is_finite()));
+    }
+    for (_, words) in &signals.words {
+        let ends: Vec<usize> = words.iter().map(|(_, end)| *end).collect();
+        assert!(ends.is_sorted_by(|a, b| a < b));
+        assert!(words.is_empty() || ends.last() == Some(&samples));
+    }
+}
+
+/// A folder with `import.toml`, and behind a line `---` the file of [`signals`].
+pub fn import(data: &[u8]) {
+    drop(imported(data));
+}
+
+/// Why it is refused. What is written is read again.
+fn imported(data: &[u8]) -> Result<(), String> {
+    let at = data.windows(RULE.len()).position(|w| w == RULE);
+    let (settings, rest) = match at {
+        Some(at) => (&data[..at], &data[at + RULE.len()..]),
+        None => (&[][..], data),
+    };
+    let folder = Folder::new();
+    let (from, to) = (folder.0.join("from"), folder.0.join("to"));
+    let put = |path: &Path, bytes: &[u8]| {
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder in RAM");
+        fs::write(path, bytes).expect("a file in RAM");
+    };
+    put(&from.join(SETTINGS), settings);
+    put(&from.join("day1/felt/a_1.dat"), &file(rest));
+    let said = |why: tactus_lab::data::recordings::RecordingError| why.to_string();
+    let survey = Survey::of(&from, Settings::default(), &|_, _| ()).map_err(said)?;
+    let left_out = survey.write(&to, &|_, _| ()).map_err(said)?;
+    let set = RecordingSet::open(&to).expect("what was written is read");
+    let slides: usize = (0..set.textures().len()).map(|t| set.slides(t).len()).sum();
+    assert_eq!(slides + left_out.len(), survey.slides());
+    assert_eq!(set.textures().len(), survey.textures.len());
+    drop(set.load_texture(0).map_err(said)?);
+    let again = Settings::default().with_file(&to).expect("our own file");
+    assert_eq!(again, survey.settings());
+    Ok(())
+}
+
+/// A WAV file of 16 bits.
+fn wav(rate_hz: u32, channels: &[&[i16]]) -> Vec<u8> {
+    let samples = channels[0].len();
+    let frame = 2 * channels.len() as u32;
+    let length = frame * samples as u32;
+    let mut file = b"RIFF".to_vec();
+    file.extend((36 + length).to_le_bytes());
+    file.extend(b"WAVEfmt \x10\0\0\0\x01\0");
+    file.extend((channels.len() as u16).to_le_bytes());
+    file.extend(rate_hz.to_le_bytes());
+    file.extend((rate_hz * frame).to_le_bytes());
+    file.extend((frame as u16).to_le_bytes());
+    file.extend(b"\x10\0data");
+    file.extend(length.to_le_bytes());
+    let all = (0..samples).flat_map(|n| channels.iter().map(move |channel| channel[n]));
+    file.extend(all.flat_map(i16::to_le_bytes));
+    file
+}
+
+/// Files of each kind that are right, long enough for a slide and of 8 KB at most; `import` has settings before them.
+pub(crate) fn seeds(with_settings: bool) -> Vec<Vec<u8>> {
+    let wave: Vec<i16> = (0..2400)
+        .map(|n: i32| ((n * n * 37 % 211 - 105) * if n < 2000 { 9 } else { 0 }) as i16)
+        .collect();
+    let bytes: Vec<u8> = wave.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let rows = |mark: &str| -> String {
+        let row = |(n, x): (usize, &i16)| {
+            let name = if n < 280 { "a" } else { "b" };
+            format!("{}.{:03}{mark}{x}{mark}{name}\n", n / 500, n % 500 * 2)
+        };
+        wave.iter().take(560).enumerate().map(row).collect()
+    };
+    let all = [
+        (
+            "speed = 20.0\nforce = 0.4\n",
+            0,
+            wav(500, &[&wave[..1000], &wave[..1000]]),
+        ),
+        ("rate = 510.5\n", 0, npy::array("<i2", &[2400], &bytes)),
+        (
+            "rate = 20\nwindow = \"0.5,60\"\n",
+            1,
+            npy::array("<i2", &[1200, 2], &bytes),
+        ),
+        (
+            "texture = \"what\"\n",
+            0,
+            ("time,x,what\n".to_owned() + &rows(",")).into_bytes(),
+        ),
+        (
+            "rate = 500\ntexture = \"day*/{texture}/{session}_*.dat\"\nlength = 0.5\n",
+            1,
+            rows("\t").into_bytes(),
+        ),
+        (
+            "rate = 500\npressure = \"1\"\nchannel = \"2\"\nfinger = \"mic\"\n",
+            1,
+            rows(";").into_bytes(),
+        ),
+    ];
+    let seeds = all.into_iter().map(|(settings, mode, file)| {
+        let head = if with_settings {
+            [settings.as_bytes(), RULE].concat()
+        } else {
+            Vec::new()
+        };
+        [&head, &[mode][..], &file].concat()
+    });
+    let seeds: Vec<_> = seeds.collect();
+    if with_settings {
+        for seed in &seeds {
+            assert_eq!(imported(seed), Ok(()), "{}", String::from_utf8_lossy(seed));
+        }
+    }
+    seeds
+}
