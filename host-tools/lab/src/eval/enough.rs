@@ -5,7 +5,7 @@ use tactus_core::features::Movement;
 use crate::eval::show::count;
 
 /// The fewest slides that show the spread of a texture's slides.
-pub const LEAST: usize = 2;
+pub(super) const LEAST: usize = 2;
 
 /// The textures and movements that are learned, and from how many slides.
 #[derive(Clone, PartialEq, Debug)]

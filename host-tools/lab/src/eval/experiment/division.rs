@@ -23,7 +23,6 @@ pub(super) struct Division<'s> {
     /// Slides that are learned from, where a second folder brings the test slides.
     learned: HashSet<SlideHash>,
     protocol: Protocol,
-    train_slides: usize,
     /// Session and run of each part that is tested in turn; none where nothing is.
     pub(super) parts: Vec<[String; 2]>,
     /// The number of each.
@@ -68,7 +67,6 @@ impl<'s> Division<'s> {
             test: test.transpose()?,
             learned: HashSet::new(),
             protocol,
-            train_slides,
             parts,
         };
         if !division.parts.is_empty() && division.test.is_some() {
