@@ -56,6 +56,11 @@
 //! | 2 | the length in ms at constant speed |
 //! | | as the table itself, learned from slides of this length: header to trials, a trial of 0 where a movement's slides are not longer |
 //! | | the contents of section 1 and of section 2, where the table has these |
+//!
+//! Section 8, of either kind of table, is for a computer that tests the table with recordings, and leaves out the
+//! slides that it was learned from: 1 if these are all, 0 if there are others (1); then of each the first bytes of the
+//! SHA-256 of its P_AC, as little-endian numbers of 16 bits (6), in rising order. Hosts take the section out before
+//! they send a table to a probe; without it, a table is the same to the byte as before it got one.
 
 mod drift;
 mod encode;
@@ -63,6 +68,7 @@ pub mod factory;
 mod finger;
 mod format;
 mod gaussian;
+mod learned;
 mod lengths;
 mod limits;
 mod matrix;
@@ -87,6 +93,7 @@ pub use format::{
     Action, Contents, MAX_ACTIONS, MAX_MOVEMENTS, MAX_TEXTURES, TableError, Tally, VERSION,
 };
 pub use gaussian::{Gaussian, Gaussians, SD_LEAST, SD_STEP, mean_step};
+pub use learned::{LearnedSlides, MAX_LEARNED, SlideHash, with_learned};
 pub use lengths::{MAX_LENGTHS, Shorter, with_lengths};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};

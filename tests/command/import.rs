@@ -55,7 +55,7 @@ fn each(rate_hz: f64, octave: f64, mut put: impl FnMut(&str, usize, &[f64])) {
     }
 }
 
-fn wav(rate: u32, bits: u16, channels: &[&[f64]]) -> Vec<u8> {
+pub(crate) fn wav(rate: u32, bits: u16, channels: &[&[f64]]) -> Vec<u8> {
     let float = bits == 32;
     let bytes = usize::from(bits / 8);
     let mut data = Vec::new();

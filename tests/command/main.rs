@@ -6,6 +6,7 @@ mod endings;
 mod import;
 mod kills;
 mod offline;
+mod protocols;
 mod refusals;
 mod study;
 mod verdicts;

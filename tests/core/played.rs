@@ -151,6 +151,8 @@ fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
             number: slide.number,
             movement: slide.movement,
             measurement: measure(&plan, &stretch(slide, STRETCH_S)).unwrap(),
+            hash: slide.hash(),
+            session: Default::default(),
         };
         slides.iter().map(observed).collect()
     };

@@ -3,12 +3,14 @@
 pub mod alike;
 mod calibrate;
 pub mod courses;
+mod enough;
 pub mod evaluate;
 pub mod evaluation;
 pub mod experiment;
 pub mod first;
 pub mod gauge;
 pub mod learn;
+pub mod learned;
 pub mod novelty;
 mod pace;
 pub mod places;

@@ -1,10 +1,24 @@
 //! Texture tables on their way to the probe, and from it.
 
-use tactus_core::table::{Table, TableError};
+use tactus_core::table::{Table, TableError, with_learned};
 use tactus_core::wire::{Command, Event, PART};
 
 use super::session::{LinkError, MAX_TRIES};
 use super::transaction::Transaction;
+
+/// The table without its note of the slides that it was learned from, which a probe has no use for.
+pub fn for_probe(table: &Table<'_>) -> Vec<u8> {
+    let mut bytes = table.as_bytes().to_vec();
+    // what is shorter has space there
+    let length = with_learned(&mut bytes, table, None).map_or(0, |bare| bare.as_bytes().len());
+    match length {
+        0 => table.as_bytes().to_vec(),
+        length => {
+            bytes.truncate(length);
+            bytes
+        }
+    }
+}
 
 /// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and
 /// has it taken into use.
@@ -16,11 +30,10 @@ pub struct PushTable {
 }
 
 impl PushTable {
-    /// The table at the beginning of `bytes`, checked.
+    /// The table in `bytes`, checked, as [`for_probe`] makes it.
     pub fn new(bytes: &[u8]) -> Result<Self, LinkError> {
-        let table = Table::read(bytes)?;
         Ok(Self {
-            bytes: table.as_bytes().to_vec(),
+            bytes: for_probe(&Table::read(bytes)?),
             next: 0,
         })
     }

@@ -18,7 +18,6 @@ const METHODS: [Method; 8] = [
     Method::Cycle,
     Method::Random,
 ];
-const PROTOCOLS: [Protocol; 3] = [Protocol::Interleaved, Protocol::Blocked, Protocol::Drift];
 
 fn one_of<T: Copy>(what: &str, wanted: &str, all: &[T], name: impl Fn(T) -> String) -> PyResult<T> {
     let found = all.iter().copied().find(|one| name(*one) == wanted);
@@ -43,7 +42,7 @@ pub(crate) fn method_name(method: Method) -> String {
 /// A protocol by its name.
 pub(crate) fn protocol(name: &str) -> PyResult<Protocol> {
     let of = |protocol: Protocol| protocol.name().to_owned();
-    one_of("protocol", name, &PROTOCOLS, of)
+    one_of("protocol", name, &Protocol::ALL, of)
 }
 
 /// Features by their name; none: the best that every slide has.

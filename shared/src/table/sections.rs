@@ -16,6 +16,7 @@ use crate::features::MAX_FEATURES;
 pub(super) const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
 pub(super) const FINGER: u16 = 5;
+pub(super) const LEARNED: u16 = 8;
 /// Most sections, of unknown kinds as well: whoever looks for one passes the others.
 const MAX_SECTIONS: usize = 32;
 

@@ -3,6 +3,7 @@
 mod damage;
 mod fused;
 mod hostile;
+mod learned;
 mod learning;
 mod lengths;
 mod samples;

@@ -111,6 +111,38 @@ fn a_table_is_checked_pushed_and_pulled() {
     );
 }
 
+/// A file notes which slides it was learned from; a probe gets the table without, and what comes back says so.
+#[test]
+fn a_probe_gets_no_note_of_slides() {
+    let bench = Bench::new(1000);
+    bench
+        .at
+        .printed("learn --recordings SIMULATED --train-slides 2 --out noted");
+    let noted = bench.at.read("noted");
+    let table = Table::read(&noted).unwrap();
+    assert_eq!(table.learned_slides().hashes.len(), 6 * 3 * 2);
+    bench.printed("table push noted --yes");
+    bench.printed("table pull pulled");
+    let pulled = bench.at.read("pulled");
+    assert_eq!(noted.len() - pulled.len(), 4 + 1 + 6 * 6 * 3 * 2);
+    assert_eq!(pulled, tactus_link::for_probe(&table));
+    let identify = "identify --recordings SIMULATED --material Burlap --table";
+    let told = bench.at.printed(&format!("{identify} noted"));
+    assert_says(
+        &told,
+        &["3 slides not learned from", "6 slides are left out"],
+    );
+    let told = bench.at.printed(&format!("{identify} pulled"));
+    assert_says(
+        &told,
+        &[
+            "9 slides (seed",
+            "does not say which slides it was learned from",
+        ],
+    );
+    assert!(!told.contains("not learned from"), "{told}");
+}
+
 /// A table of 24 movements does not fit into the sectors of the shorter ones, and works as they do.
 #[test]
 fn a_table_that_is_longer_than_a_small_sector_is_used_and_added_to() {

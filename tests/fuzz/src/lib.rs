@@ -22,6 +22,7 @@ use tactus_core::table::{Change, Table, amend};
 use tactus_core::wire::{Command, Event, MAX_FRAME, Receiver, Report, Request};
 use tactus_lab::data::recordings::npy;
 use tactus_lab::eval::learn::know_lengths;
+use tactus_lab::eval::learned::note_learned;
 use tactus_lab::remote::Remote;
 use tactus_link::log::{Line, TableParts};
 
@@ -199,6 +200,8 @@ fn look_at(table: &Table<'_>) {
         }
         table.tally(texture);
     }
+    let learned = table.learned_slides();
+    assert!(learned.hashes.iter().all(|hash| learned.has(hash)));
 }
 
 /// An exploration to its end, with slides made of the bytes.
@@ -423,7 +426,12 @@ pub fn seeds(target: &str) -> Vec<Vec<u8>> {
                 know_lengths(table, &shorter).expect("a table of two lengths")
             };
             let tables = flash::tables();
+            let noted = |table: &Vec<u8>| {
+                let slides = [[7; 6], [9; 6]];
+                note_learned(table, true, slides).expect("a table that notes two slides")
+            };
             let tables = tables.iter().cloned().chain(tables.iter().map(with_length));
+            let tables = tables.chain(flash::tables().iter().map(noted));
             tables
                 .map(|table| behind(1, &table[..table.len() - 4]))
                 .collect()

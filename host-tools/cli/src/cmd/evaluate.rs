@@ -72,6 +72,9 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         count(e.max_slides, "slide"),
         e.seed
     )?;
+    for note in &e.notes {
+        writeln!(out, "{note}")?;
+    }
     let row = |name: &str, value| format!("  {name:<26} {value}");
     let share = |share: f64| format!("{:5.1} %", share * 100.0);
     writeln!(
@@ -86,6 +89,7 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     let s = &e.summary;
     let slides = format!("median {}, mean {:.2}", s.median_slides, s.mean_slides);
     let mut rows = vec![
+        ("right after one slide", share(e.one_slide_accuracy)),
         ("most probable one right", share(s.accuracy)),
         ("sure", share(s.converged)),
         ("wrong among the sure", share(s.wrong_when_sure)),

@@ -14,12 +14,14 @@ use tactus_core::features::Observation;
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::{MAX_TEXTURES, Table};
+use tactus_lab::data::recording::Recording;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{Replay, ReplayError};
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::first::at_least_two;
 use tactus_lab::eval::learn::Expected;
+use tactus_lab::eval::learned::LeftOut;
 use tactus_lab::eval::show::{Show, count, is_right};
 use tactus_lab::eval::transcript::{Answer, Transcript};
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
@@ -27,10 +29,9 @@ use tactus_lab::sim::rig::SimRig;
 use tactus_study::pictures::exploration::Exploration;
 
 use super::args::{Expecting, Recordings, Stop};
-use super::learn::learned_here;
 use super::output::{Done, Format, print_json};
 use super::plot::{Canvas, Plot};
-use super::progress::with_progress;
+use super::progress::{notice, with_progress};
 use super::table_file::read_table;
 use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
 
@@ -117,6 +118,9 @@ struct Identification {
     /// Whether it ended for want of recordings.
     recordings_ran_out: bool,
     verdict: Answer,
+    /// With a table: slides that it was learned from, and that were left out.
+    #[serde(flatten)]
+    left_out: Option<LeftOut>,
     /// Time of the simulated rig, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     rig_s: Option<f64>,
@@ -155,10 +159,10 @@ fn identify_recorded(
     };
     let (_, measured) = measure_folder(folder)?;
     let mut shown = set.load_texture(index)?;
+    let mut left_out = None;
     let table = if let Some((file, table)) = given {
         of_one_finger(&set, table)?;
-        let mut first = learned_here(&set, &measured, table);
-        shown.retain(|slide| !first.is_one(name, slide.movement));
+        left_out = Some(LeftOut::of(table, &mut shown, Recording::hash));
         ensure!(
             !shown.is_empty(),
             "{}: learned from every slide of {name} here; none is left to present",
@@ -173,9 +177,16 @@ fn identify_recorded(
             drift: Some(args.expecting.drift),
             ..Expected::default()
         });
-        let run = experiment.run_alone(index as u64);
+        for note in experiment.notes() {
+            notice(note);
+        }
+        let at = experiment.names().iter().position(|other| other == name);
+        let at = at.with_context(|| {
+            format!("{name} has too few slides to learn from, and one to present")
+        })?;
+        let run = experiment.run_alone(at as u64);
         learned = run.learn(args.method.unwrap_or(Method::Fused).method())?;
-        let seen = &run.training()[index];
+        let seen = &run.training()[at];
         let mut measured = measured[index].iter();
         shown.retain(|slide| {
             measured.next().is_some_and(|measured| {
@@ -194,18 +205,24 @@ fn identify_recorded(
         )?;
     }
     let slides = count(shown.len() as u64, "slide");
+    let known = left_out.is_none_or(|left_out| left_out.all_known);
     let mut rig = Replay::new(shown, ChaCha8Rng::from_rng(&mut random));
     if is_text {
         writeln!(
             out,
-            "An unknown texture, one of {}. Presented: {name}, {slides} not learned from (seed {}).",
+            "An unknown texture, one of {}. Presented: {name}, {slides}{} (seed {}).",
             table.textures(),
+            if known { " not learned from" } else { "" },
             args.seed
         )?;
+        if let Some(said) = left_out.and_then(|left_out| left_out.in_words()) {
+            writeln!(out, "{said}")?;
+        }
     }
     let ran_out = |why: &ReplayError| matches!(why, ReplayError::RanOut(_));
     let mut presented = Presented::new(name, table);
     let found = explore_and_show(&mut rig, &mut presented, args, &mut random, ran_out, out)?;
+    let found = Identification { left_out, ..found };
     if !is_text {
         print_json(&found, out)?;
     }
@@ -323,6 +340,7 @@ where
         slides,
         recordings_ran_out,
         verdict: Answer::new(verdict, explorer.slides(), table),
+        left_out: None,
         rig_s: None,
         skin_j: None,
     })

@@ -1,18 +1,16 @@
 //! `tactus learn` and `tactus learn-by-hand`: tables of textures from slides.
 
-use std::collections::HashMap;
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail, ensure};
-use tactus_core::explorer;
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerName;
-use tactus_core::table::{FALSE_ALARM, Table};
+use tactus_core::table::{FALSE_ALARM, MAX_LEARNED, Table};
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{CutSlide, MeasuredSlide, measure_cut};
 use tactus_lab::eval::evaluate::Method;
-use tactus_lab::eval::first::learn_first;
+use tactus_lab::eval::first::{learn_first, learned_textures};
 use tactus_lab::eval::learn::{Expected, know_lengths};
 use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::texture_name;
@@ -106,22 +104,39 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let bytes = with_lengths(args, &set, bytes, &expected)?;
     write_file(&args.out, &bytes, args.force)?;
     let out = &mut beside(&args.out, out);
+    let learned = learned_textures(&set, &measured)?;
     writeln!(
         out,
         "{}: {} learned from the first {} of each, {} bytes",
         args.out.display(),
-        count(set.textures().len() as u64, "texture"),
+        count(learned.textures.len() as u64, "texture"),
         count(args.train_slides as u64, "slide"),
         bytes.len()
     )?;
-    for (texture, measured) in set.textures().iter().zip(&measured) {
-        for movement in set.movements() {
-            let slides = measured.iter().filter(|s| s.movement == movement).count();
-            if slides < args.train_slides {
-                let slides = count(slides as u64, "slide");
-                writeln!(out, "{}, {movement}: only {slides}", texture.name)?;
-            }
-        }
+    for note in &learned.notes {
+        writeln!(out, "{note}")?;
+    }
+    let fewest = |texture: &usize| {
+        let of = |movement: &Movement| {
+            let slides = measured[*texture].iter();
+            slides.filter(|s| s.movement == *movement).count()
+        };
+        learned.movements.iter().map(of).min().unwrap_or(0)
+    };
+    let there: Vec<usize> = learned.textures.iter().map(fewest).collect();
+    let short = there.iter().filter(|n| **n < args.train_slides).count();
+    if let Some(fewest) = there.into_iter().min().filter(|_| short > 0) {
+        let (short, wanted) = (count(short as u64, "texture"), args.train_slides);
+        writeln!(
+            out,
+            "Fewer than {wanted} slides at a movement have {short}, {fewest} at least: all of them are learned from."
+        )?;
+    }
+    if !Table::read(&bytes)?.learned_slides().all {
+        writeln!(
+            out,
+            "It notes {MAX_LEARNED} of the slides that it was learned from, and not the others."
+        )?;
     }
     Ok(())
 }
@@ -137,8 +152,9 @@ fn with_lengths(
         return Ok(bytes);
     }
     let lengths_ms = rising(&args.lengths)?;
+    let table = Table::read(&bytes)?;
     ensure!(
-        !Table::read(&bytes)?.is_paced(),
+        !table.is_paced(),
         "--lengths: these slides have speeds of their own, as those of a hand; a table knows speeds or lengths, not \
          both"
     );
@@ -149,7 +165,7 @@ fn with_lengths(
     let features = args.features.map(Features::set);
     let shorter = (0..).zip(&lengths_ms).map(|(n, &ms)| {
         let of_length = of_length(&slides, n);
-        let movements = (0..).zip(set.movements());
+        let movements = (0..).zip(table.movements());
         let longer = movements.filter(|(_, movement)| is_longer(&slides, *movement, n));
         let movements = longer.map(|(at, _)| 1_u64 << at).sum();
         let (slides, method) = (args.train_slides, args.method);
@@ -190,45 +206,6 @@ pub(crate) fn by_hand(args: &ByHand, out: &mut impl Write) -> anyhow::Result<()>
         writeln!(out, "left out, no good slide of it: {name}")?;
     }
     Ok(())
-}
-
-/// The slides of a folder that a table has seen: the first of every texture and movement, if it was learned from this
-/// folder.
-pub(crate) struct LearnedHere {
-    first: usize,
-    met: HashMap<(String, Movement), usize>,
-}
-
-impl LearnedHere {
-    /// Whether the next slide of this texture and movement, in the order of time, is one of them.
-    pub(crate) fn is_one(&mut self, texture: &str, movement: Movement) -> bool {
-        let before = self.met.entry((texture.to_owned(), movement)).or_default();
-        *before += 1;
-        *before <= self.first
-    }
-}
-
-pub(crate) fn learned_here(
-    set: &RecordingSet,
-    measured: &[Vec<MeasuredSlide>],
-    table: Table<'_>,
-) -> LearnedHere {
-    let cells = (0..table.textures())
-        .flat_map(|texture| (0..).zip(table.movements()).map(move |(m, _)| (texture, m)));
-    let trials = cells.map(|(texture, movement)| table.trials(texture, movement));
-    let trials = trials.max().unwrap_or(0).into();
-    let learned_as = Method::of(explorer::Method::of(table.contents()));
-    let expected = Expected {
-        drift: table.drift(),
-        false_alarm: table.limits().map_or(FALSE_ALARM, |l| l.false_alarm),
-    };
-    let own = learn_first(set, measured, trials, learned_as, None, &expected);
-    let whole = know_lengths(table.as_bytes(), &[]);
-    let is_own = own.is_ok_and(|own| whole.is_ok_and(|whole| own == whole));
-    LearnedHere {
-        first: if is_own { trials } else { 0 },
-        met: HashMap::new(),
-    }
 }
 
 /// Returns the slides as their first parts of the `n`th length. What stands for one that is not longer says nothing:

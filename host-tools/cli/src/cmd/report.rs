@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde::Serialize;
 use tactus_core::table::Table;
+use tactus_lab::data::replay::MeasuredSlide;
+use tactus_lab::eval::learned::LeftOut;
 use tactus_lab::eval::report::{RUNS, Report, Slides};
 use tactus_lab::eval::samples;
 use tactus_lab::eval::show::count;
@@ -15,7 +17,6 @@ use tactus_study::page::render;
 use tactus_study::pictures::map;
 
 use super::args::Recordings;
-use super::learn::learned_here;
 use super::output::{Format, UsageError, percent, print_json, verdict_rows};
 use super::plot::Plot;
 use super::progress::{notice, progress};
@@ -32,7 +33,7 @@ Examples:
   tactus report --recordings ANNA --recordings BEN --plot charts    two operators, and control charts
   tactus device record cork felt --slides 5 --operator Anna --lot 7 --out ANNA
 
-Slides that the table was learned from do not count, where it was learned from this very folder.
+Slides that the table was learned from do not count, wherever they are.
 Without a table, a part is a texture, or a lot of it. Operators are compared if each of them touched
 every part. Below 10 % of all variation a gauge is usually called good, above 30 % not acceptable; it
 should tell at least five classes apart.")]
@@ -89,9 +90,13 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
     let slides = folder.map(|folder| unseen(folder, table)).transpose()?;
     let runs = slides
         .as_ref()
-        .map_or(0, |slides| RUNS * slides.len() as u64);
+        .map_or(0, |(slides, _)| RUNS * slides.len() as u64);
     let bar = progress(runs, "exploring");
-    let report = Report::new(table, slides.as_deref(), args.seed, || bar.inc(1));
+    let (slides, left_out) = slides.unzip();
+    let mut report = Report::new(table, slides.as_deref(), args.seed, || bar.inc(1));
+    if let (Ok(report), Some(left_out)) = (&mut report, left_out) {
+        report.leave_out(left_out);
+    }
     bar.finish_and_clear();
     let report = report.with_context(|| file.display().to_string())?;
     if let Some(path) = &args.out {
@@ -124,21 +129,17 @@ fn command(file: &Path, args: &Args) -> String {
     command
 }
 
-/// The slides of a folder that the table has not seen.
-fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<Vec<Slides>> {
+/// The slides of a folder that the table was not learned from, and what was left out.
+fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<(Vec<Slides>, LeftOut)> {
     let (set, measured) = measure_folder(folder)?;
     of_one_finger(&set, table)?;
-    let mut first = learned_here(&set, &measured, table);
-    let textures = set.textures().iter().zip(measured);
-    Ok(textures
-        .map(|(texture, mut slides)| {
-            slides.retain(|slide| !first.is_one(&texture.name, slide.movement));
-            Slides {
-                name: texture.name.clone(),
-                slides,
-            }
-        })
-        .collect())
+    let mut out = LeftOut::of(table, &mut Vec::new(), |slide: &MeasuredSlide| slide.hash);
+    let textures = set.names().into_iter().zip(measured);
+    let slides = textures.map(|(name, mut slides)| {
+        out.slides += LeftOut::of(table, &mut slides, |slide| slide.hash).slides;
+        Slides { name, slides }
+    });
+    Ok((slides.collect(), out))
 }
 
 fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result<()> {
@@ -179,6 +180,9 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
             "\nWhat users would be told, by {explorations} of recorded slides, {:.1} slides each in the mean:",
             recorded.mean_slides
         )?;
+        if let Some(said) = &recorded.remark {
+            writeln!(out, "  {said}")?;
+        }
         let unknown = recorded.unknown.as_ref();
         let of = [
             ("textures of the table", Some(&recorded.known)),

@@ -1,5 +1,6 @@
 //! `tactus verify`: whether slides are of one texture, whatever else they may be of.
 
+use std::collections::HashSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -7,12 +8,13 @@ use anyhow::{Context as _, ensure};
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Answer, Config, Strategy};
 use tactus_core::features::{Movement, Observation, PropertySet};
-use tactus_core::table::{Action, POPULATION, Table};
+use tactus_core::table::{Action, POPULATION, SlideHash, Table};
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{MeasuredSlide, measure};
 use tactus_lab::eval::evaluate::{Method, explorer};
 use tactus_lab::eval::first::learn_first;
 use tactus_lab::eval::learn::Expected;
+use tactus_lab::eval::learned::LeftOut;
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verified::{Slide, Verified, name, print_answer, print_slide};
 use tactus_lab::eval::verify::{false_accept, put};
@@ -87,17 +89,24 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let Some(folder) = &args.sample else {
         return run_simulated(args, out);
     };
-    let (bytes, texture) = reference(args, folder)?;
-    let table = Table::read(&bytes)?;
-    let (set, measured) = measure_folder(folder)?;
-    of_one_finger(&set, table)?;
+    let (set, mut measured) = measure_folder(folder)?;
     let sample = one(&set, args.material.as_deref(), folder, "--material")?;
     let sample_name = set.textures()[sample].name.clone();
+    let mut slides = measured.swap_remove(sample);
+    let (bytes, texture) = reference(args, folder, &slides)?;
+    let table = Table::read(&bytes)?;
+    of_one_finger(&set, table)?;
+    let left_out = LeftOut::of(table, &mut slides, |slide| slide.hash);
+    ensure!(
+        left_out.slides == 0 || !slides.is_empty(),
+        "{}: the table was learned from every slide of {sample_name} here; give others",
+        folder.display()
+    );
     let usable = |slide: &&MeasuredSlide| {
         let at = index_of(table, slide.movement);
         at.is_some_and(|at| table.trials(texture, at) > 0)
     };
-    let slides: Vec<&MeasuredSlide> = measured[sample].iter().filter(usable).collect();
+    let slides: Vec<&MeasuredSlide> = slides.iter().filter(usable).collect();
     ensure!(
         !slides.is_empty(),
         "{}: {sample_name} has no slide at a movement of the reference",
@@ -113,7 +122,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
             observation: Observation::from(&slide.measurement),
         })
     });
-    hold(args, (&bytes, texture), sample_name, measures, made, out)
+    let sample = (sample_name, Some(left_out));
+    hold(args, (&bytes, texture), sample, measures, made, out)
 }
 
 /// Learns on the simulated rig, then slides there, movement after movement.
@@ -161,7 +171,14 @@ fn run_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
             }))
         });
     let name = texture_name(under).to_owned();
-    hold(args, (&bytes, texture), name, PropertySet::ALL, made, out)
+    hold(
+        args,
+        (&bytes, texture),
+        (name, None),
+        PropertySet::ALL,
+        made,
+        out,
+    )
 }
 
 fn index_of(table: Table<'_>, movement: Movement) -> Option<u8> {
@@ -173,7 +190,7 @@ fn index_of(table: Table<'_>, movement: Movement) -> Option<u8> {
 fn hold(
     args: &Args,
     (bytes, texture): (&[u8], u16),
-    sample: String,
+    (sample, left_out): (String, Option<LeftOut>),
     measures: PropertySet,
     slides: impl Iterator<Item = anyhow::Result<Made>>,
     out: &mut impl Write,
@@ -187,6 +204,7 @@ fn hold(
     let mut verified = Verified::new(table, texture, &config)?;
     let mut explorer = explorer(bytes, measures, config, Some(&[texture]))?;
     verified.sample = Some(sample);
+    verified.left_out = left_out;
     for slide in slides.take(args.stop.max_slides.into()) {
         let slide = slide?;
         let Some(movement) = index_of(table, slide.movement) else {
@@ -226,7 +244,12 @@ fn hold(
     Ok(Done::of(&verified))
 }
 
-fn reference(args: &Args, sample: &Path) -> anyhow::Result<(Vec<u8>, u16)> {
+/// The table, and its texture that `slides` of the folder `sample` are held against.
+fn reference(
+    args: &Args,
+    sample: &Path,
+    slides: &[MeasuredSlide],
+) -> anyhow::Result<(Vec<u8>, u16)> {
     let mut bytes = Vec::new();
     let given = match &args.table {
         Some(file) => Some((file, read_table(file, &mut bytes)?)),
@@ -247,7 +270,7 @@ fn reference(args: &Args, sample: &Path) -> anyhow::Result<(Vec<u8>, u16)> {
             .context("a name of the table is in the table")?;
         return Ok((table.as_bytes().to_vec(), texture));
     };
-    let (set, measured) = measure_folder(folder)?;
+    let (set, mut measured) = measure_folder(folder)?;
     let index = one(&set, args.texture.as_deref(), folder, "--texture")?;
     let name = &set.textures()[index].name;
     let is_same_folder = same_folder(folder, sample);
@@ -264,7 +287,12 @@ fn reference(args: &Args, sample: &Path) -> anyhow::Result<(Vec<u8>, u16)> {
             .and_then(|()| Ok(put(table, name, &measured[index])?))
             .with_context(|| format!("{} with the reference", file.display()))?,
         None => {
-            let textures = set.textures().len();
+            // the scale is not learned from what is held against it
+            let held: HashSet<SlideHash> = slides.iter().map(|slide| slide.hash).collect();
+            for (texture, measured) in measured.iter_mut().enumerate() {
+                measured.retain(|slide| texture == index || !held.contains(&slide.hash));
+            }
+            let textures = measured.iter().filter(|slides| !slides.is_empty()).count();
             ensure!(
                 textures > POPULATION,
                 "{}: {} say little of how textures differ: give --table TABLE for the scale",
@@ -324,6 +352,9 @@ fn print(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
         count(v.slides.len() as u64, "slide"),
         v.sample.as_deref().unwrap_or("unknown")
     )?;
+    if let Some(said) = v.left_out.and_then(|left_out| left_out.in_words()) {
+        writeln!(out, "{said}")?;
+    }
     for slide in &v.slides {
         print_slide(slide, out)?;
     }

@@ -1,10 +1,12 @@
 //! One recorded slide: the movement that made it, its blocks of samples, and what no block has.
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 use std::ops::Range;
 use tactus_core::features::{Block, Movement, Slide};
 use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::RATE_HZ;
+use tactus_core::table::SlideHash;
 
 use crate::data::recordings::npy::MAX_SAMPLES;
 
@@ -190,6 +192,16 @@ impl Recording {
         let [before, after] = self.outside_mn.as_ref()?;
         let inside = self.samples(false, |block| &block.shear_mn);
         Some([before, &inside, after].map(Vec::as_slice).concat())
+    }
+
+    /// The hash by which it is known again, whatever its file or row: of P_AC.
+    pub fn hash(&self) -> SlideHash {
+        let pac: Vec<u8> = self.pac().iter().flat_map(|x| x.to_le_bytes()).collect();
+        let mut hash = SlideHash::default();
+        hash.iter_mut()
+            .zip(Sha256::digest(pac))
+            .for_each(|(to, from)| *to = from);
+        hash
     }
 
     /// Memory of its samples.

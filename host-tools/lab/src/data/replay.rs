@@ -7,9 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use tactus_core::dsp::Plan;
 use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
 use tactus_core::rig::Rig;
+use tactus_core::table::SlideHash;
 
 use crate::data::quality::SlideChecks;
-use crate::data::recording::{Recording, Texture};
+use crate::data::recording::{Labels, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingSet};
 
@@ -30,6 +31,24 @@ pub struct MeasuredSlide {
     pub movement: Movement,
     /// The core's measurement.
     pub measurement: Measurement,
+    /// Its samples' hash: see [`Recording::hash`].
+    pub hash: SlideHash,
+    /// Session and run, as [`Labels`] have them; empty if unknown.
+    pub session: [String; 2],
+}
+
+impl MeasuredSlide {
+    /// Measures a slide; of the session and run of `labels`.
+    /// Errors: as [`measure`].
+    pub fn of(plan: &Plan, slide: &Recording, labels: &Labels) -> Result<Self, SlideError> {
+        Ok(Self {
+            number: slide.number,
+            movement: slide.movement,
+            measurement: measure(plan, slide)?,
+            hash: slide.hash(),
+            session: [labels.session.clone(), labels.run.clone()],
+        })
+    }
 }
 
 /// Number of each slide of a texture among those of its movement, from 1.
@@ -50,13 +69,7 @@ pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
 ) -> Result<Vec<Vec<MeasuredSlide>>, RecordingError> {
-    measure_each(set, done, |plan, slide| {
-        Ok(MeasuredSlide {
-            number: slide.number,
-            movement: slide.movement,
-            measurement: measure(plan, slide)?,
-        })
-    })
+    measure_each(set, done, MeasuredSlide::of)
 }
 
 /// A recorded slide, and the features of its first part alone.
@@ -77,7 +90,7 @@ pub fn measure_cut(
     lengths_ms: &[u16],
     done: impl Fn(&Texture) + Sync,
 ) -> Result<Vec<Vec<CutSlide>>, RecordingError> {
-    measure_each(set, done, |plan, slide| {
+    measure_each(set, done, |plan, slide, labels| {
         let first = |&ms: &u16| {
             slide
                 .first(ms)
@@ -87,11 +100,7 @@ pub fn measure_cut(
         Ok(CutSlide {
             first: lengths_ms.iter().map(first).collect::<Result<_, _>>()?,
             seconds: slide.window.1 - slide.window.0,
-            whole: MeasuredSlide {
-                number: slide.number,
-                movement: slide.movement,
-                measurement: measure(plan, slide)?,
-            },
+            whole: MeasuredSlide::of(plan, slide, labels)?,
         })
     })
 }
@@ -99,7 +108,7 @@ pub fn measure_cut(
 fn measure_each<T: Send>(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
-    of: impl Fn(&Plan, &Recording) -> Result<T, SlideError> + Sync,
+    of: impl Fn(&Plan, &Recording, &Labels) -> Result<T, SlideError> + Sync,
 ) -> Result<Vec<Vec<T>>, RecordingError> {
     let plan = Plan::new();
     let textures: Vec<usize> = (0..set.textures().len()).collect();
@@ -107,6 +116,8 @@ fn measure_each<T: Send>(
     each_in_flight(&textures, memory, |&index| {
         let texture = &set.textures()[index];
         let (mut checks, mut measured) = (SlideChecks::default(), Vec::new());
+        // in the order of time, as slides are read
+        let mut keys = set.slides(index).iter();
         set.each_slide(index, &mut |slide| {
             let fault = |why: String| {
                 let (number, texture) = (slide.number, &texture.name);
@@ -117,7 +128,9 @@ fn measure_each<T: Send>(
                     "{why} (record it again, or let `tactus import` leave it out)"
                 ))
             })?;
-            measured.push(of(&plan, &slide).map_err(|why| fault(why.to_string()))?);
+            let labels = keys.next().map(|key| key.labels.clone());
+            let labels = labels.unwrap_or_default();
+            measured.push(of(&plan, &slide, &labels).map_err(|why| fault(why.to_string()))?);
             Ok(())
         })?;
         done(texture);

@@ -26,7 +26,11 @@ pub fn read_table<'b>(
             ": no table here, `tactus learn --out FILE` writes one: {why}"
         ))
     })?;
-    let checked = Table::read(bytes).and_then(|table| table.check_samples().map(|()| table));
+    let checked = Table::read(bytes).and_then(|table| {
+        table.check_samples()?;
+        table.check_learned()?;
+        Ok(table)
+    });
     let table = checked.map_err(|why| error(format!(": {why}")))?;
     if bytes.len() > table.as_bytes().len() {
         let why = ": other bytes follow the table; the file is not what `tactus learn` wrote";

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use rand::Rng as _;
+use rand::{Rng as _, RngExt as _};
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy, VerdictKind};
@@ -114,6 +114,29 @@ pub fn play<const N: usize>(
     play_with(explorer, strategy, run, |_, _| ())
 }
 
+/// Returns true if the most probable texture after one slide is the right one. The movement, and with some methods the
+/// property looked at, is any.
+pub(crate) fn is_right_at_once<const N: usize>(
+    explorer: &mut Explorer<'_, N>,
+    mut run: Run<'_>,
+) -> bool {
+    explorer.restart();
+    let mut outcomes = explorer.expected_outcomes();
+    while !outcomes.is_empty() {
+        let drawn = run.random.random_range(0..outcomes.len());
+        let action = outcomes.swap_remove(drawn).action;
+        // a part that is tested may have no slide at a movement
+        let Some(slide) = run.slide(action.movement.into()) else {
+            continue;
+        };
+        explorer
+            .observe(action, slide)
+            .expect("every slide has the properties that the explorer was told of");
+        return usize::from(explorer.best().texture) == run.unknown;
+    }
+    false
+}
+
 /// As [`play`]; `each` gets every action and the explorer after it.
 pub(crate) fn play_with<const N: usize>(
     explorer: &mut Explorer<'_, N>,
@@ -198,18 +221,15 @@ pub(super) fn evaluate_by<T: Send>(
         let all = (0..runs).into_par_iter().panic_fuse();
         return Ok(all.map_init(|| explorer.clone(), run).collect());
     }
-    let round = experiment.round();
-    let rounds = (0..runs.div_ceil(round)).into_par_iter().panic_fuse();
-    let played = rounds.map(|number| {
-        let first = number * round;
-        let bytes = learn(first)?;
+    let rounds = experiment.rounds(runs).into_par_iter().panic_fuse();
+    let played = rounds.map(|runs| {
+        let bytes = learn(runs.start)?;
         let mut explorer = explorer(
             &bytes,
             experiment.measured,
             config,
             experiment.candidates.as_deref(),
         )?;
-        let runs = first..runs.min(first + round);
         let played = runs.map(|index| run(&mut explorer, index));
         Ok(played.collect())
     });

@@ -4,7 +4,9 @@ use serde::Serialize;
 use tactus_core::explorer::Config;
 
 use crate::eval::courses::courses;
-use crate::eval::evaluate::{EvaluateError, Method, Outcome, Summary, evaluate};
+use crate::eval::evaluate::{
+    EvaluateError, Method, Outcome, Summary, evaluate, evaluate_by, is_right_at_once, play,
+};
 use crate::eval::experiment::Experiment;
 use crate::eval::reliability::{Statements, statements};
 use crate::eval::verdicts::Verdicts;
@@ -20,6 +22,8 @@ pub struct Evaluation {
     pub protocol: &'static str,
     /// Slides learned from, per texture and movement.
     pub train_slides: usize,
+    /// Sentences on textures and slides that were left out, and on sessions that were tested in turn.
+    pub notes: Vec<String>,
     /// Virtual explorations.
     pub runs: u64,
     /// Textures.
@@ -36,6 +40,9 @@ pub struct Evaluation {
     pub mean_slides_told: f64,
     /// Reliability of the probabilities: share of right names by the stated probability.
     pub reliability: Vec<Statements>,
+    /// Share of single slides, at any movement, whose most probable texture is the right one, where the texture is one
+    /// of the table's for certain: the figure of classifiers that have no other answer.
+    pub one_slide_accuracy: f64,
     /// Figures of explorations whose texture is one of the table's for certain, with slides drawn with replacement: the
     /// paper's protocol.
     #[serde(flatten)]
@@ -76,11 +83,16 @@ pub fn evaluation(
         ..
     } = *request;
     let stages = if request.with_courses { 3 } else { 2 };
-    let mut outcomes = Vec::new();
+    let mut played = Vec::new();
     stage([1, stages], &mut |done| {
-        outcomes = evaluate(&experiment, config, runs, done)?;
+        played = evaluate_by(&experiment, config, runs, done, |explorer, run| {
+            let at_once = is_right_at_once(explorer, run.clone());
+            (play(explorer, config.strategy, run), at_once)
+        })?;
         Ok(())
     })?;
+    let (outcomes, at_once): (Vec<Outcome>, Vec<bool>) = played.into_iter().unzip();
+    let right = at_once.iter().filter(|right| **right).count();
     let summary = Summary::new(&outcomes, &experiment.names, config.max_slides);
     let (experiment, config) = as_told(experiment, config);
     let mut told = Vec::new();
@@ -101,6 +113,7 @@ pub fn evaluation(
         method,
         protocol: request.protocol,
         train_slides: experiment.train_slides,
+        notes: experiment.notes.clone(),
         runs,
         textures: names.len(),
         threshold: config.threshold,
@@ -108,6 +121,7 @@ pub fn evaluation(
         seed: request.seed,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
         mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
+        one_slide_accuracy: right as f64 / at_once.len().max(1) as f64,
         summary,
     };
     Ok((evaluation, all))

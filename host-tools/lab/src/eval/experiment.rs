@@ -6,22 +6,27 @@
 //! and its runs share the table: learning one takes a hundred times as long as a run.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
+use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
-use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use tactus_core::explorer::Method;
 use tactus_core::features::{FeatureSet, Movement, Observation, Properties, PropertySet};
 use tactus_core::table;
 
 use crate::data::properties::PropertyTable;
 use crate::data::replay::MeasuredSlide;
-use crate::eval::learn::{Expected, TableError, learn_for};
+use crate::eval::enough::Enough;
+use crate::eval::learn::Expected;
 use crate::eval::show::count;
 
+mod division;
 mod protocol;
+mod run;
 
+use division::Division;
 pub use protocol::Protocol;
+pub use run::Run;
 
 /// A reason why slides do not make an experiment.
 #[derive(Debug, thiserror::Error)]
@@ -51,12 +56,8 @@ impl ExperimentError {
     }
 }
 
-/// Slides of a session that [`Protocol::Blocked`] trains from, out of [`SESSION`].
-const BLOCKED_TRAINING: usize = 19;
-const SESSION: usize = 34;
-/// Limit of the slide numbers that blocked trains on, where a second folder brings the test slides ...
-const BLOCKED_BELOW: u32 = 30;
-const BLOCKED_ABOVE: u32 = 34;
+/// Sessions or runs that are named, at most.
+const MOST_LISTED: usize = 12;
 
 #[derive(Clone, PartialEq, Debug, Default)]
 struct Pool {
@@ -64,6 +65,26 @@ struct Pool {
     train: Vec<Observation>,
     /// Slides of the unknown texture; without them, the rest after training.
     test: Option<Vec<Observation>>,
+    /// The part of each slide of `train`, where parts are tested in turn; else empty.
+    parts: Vec<usize>,
+}
+
+impl Pool {
+    /// The slides to learn from while a part is tested.
+    fn to_learn(&self, part: usize) -> Vec<usize> {
+        match self.parts.is_empty() {
+            true => (0..self.train.len()).collect(),
+            false => self.places(|of| of != part),
+        }
+    }
+
+    fn places(&self, is_wanted: impl Fn(usize) -> bool) -> Vec<usize> {
+        let parts = self.parts.iter().enumerate();
+        parts
+            .filter(|(_, part)| is_wanted(**part))
+            .map(|(at, _)| at)
+            .collect()
+    }
 }
 
 /// A set of textures with a way to divide their slides.
@@ -75,7 +96,8 @@ pub struct Experiment {
     pub movements: Vec<Movement>,
     /// Per texture and movement.
     pools: Vec<Vec<Pool>>,
-    unknowns: Vec<usize>,
+    /// Textures that are unknown in turn, for each part that is tested in turn; else one part for all.
+    unknowns: Vec<Vec<usize>>,
     /// Textures that the unknown one can be, as far as the explorer knows; all, unless given.
     pub candidates: Option<Vec<u16>>,
     /// Training slides per texture and movement; the fewest of any, where all are used.
@@ -91,6 +113,8 @@ pub struct Experiment {
     expected: Expected,
     once: bool,
     seed: u64,
+    /// Sentences on what was left out of the recordings, or lowered, and on what is tested in turn.
+    pub notes: Vec<String>,
 }
 
 impl Experiment {
@@ -103,7 +127,7 @@ impl Experiment {
         seed: u64,
     ) -> Self {
         Self {
-            unknowns: (0..names.len()).collect(),
+            unknowns: vec![(0..names.len()).collect()],
             names,
             movements,
             pools,
@@ -116,10 +140,13 @@ impl Experiment {
             expected: Expected::default(),
             once: false,
             seed,
+            notes: Vec::new(),
         }
     }
 
-    /// Recorded slides. Without a second folder the test slides come from the first.
+    /// Recorded slides. Without a second folder the test slides come from the first; those of the second from which is
+    /// learned are left out. Textures with too few slides are left out, or fewer slides are learned from: see
+    /// [`notes`](Self::notes).
     pub fn recorded(
         names: Vec<String>,
         observed: &[Vec<MeasuredSlide>],
@@ -131,84 +158,84 @@ impl Experiment {
         if train_slides < 2 {
             return Err(ExperimentError::one(train_slides));
         }
+        let division = Division::new(&names, observed, test, protocol, train_slides)?;
         let mut movements: Vec<Movement> = Vec::new();
         for slide in observed.iter().flatten() {
             if !movements.contains(&slide.movement) {
                 movements.push(slide.movement);
             }
         }
-        let of = |slides: &[MeasuredSlide], movement| -> Vec<(u32, Observation)> {
-            let same = slides.iter().filter(|s| s.movement == movement);
-            same.map(|s| (s.number, Observation::from(&s.measurement)))
-                .collect()
-        };
-        let properties =
-            |slides: &[(u32, Observation)]| slides.iter().map(|s| s.1.clone()).collect::<Vec<_>>();
-        let pool = |texture: usize, movement: Movement| {
-            let mut train = of(&observed[texture], movement);
-            let mut tested = match test {
-                None => None,
-                Some((others, slides)) => {
-                    let other = others.iter().position(|name| *name == names[texture]);
-                    let other = other.ok_or_else(|| {
-                        let name = &names[texture];
-                        ExperimentError(format!(
-                            "the test folder has no {name}, which the training folder has; give a folder of the same \
-                             textures"
-                        ))
-                    })?;
-                    Some(of(&slides[other], movement))
-                }
-            };
-            match (protocol, &mut tested) {
-                (Protocol::Interleaved, _) | (Protocol::Drift, Some(_)) => {}
-                (Protocol::Blocked, Some(tested)) => {
-                    train.retain(|s| s.0 < BLOCKED_BELOW);
-                    tested.retain(|s| s.0 > BLOCKED_ABOVE);
-                }
-                (Protocol::Blocked, None) => {
-                    let first = (train.len() * BLOCKED_TRAINING + SESSION / 2) / SESSION;
-                    tested = Some(train.split_off(first));
-                }
-                (Protocol::Drift, None) => {
-                    tested = Some(train.split_off(train_slides.min(train.len())));
-                }
-            }
-            let there = train.len();
-            let pool = Pool {
-                train: properties(&train),
-                test: tested.as_deref().map(properties),
-            };
-            let texture = &names[texture];
-            if there < train_slides {
-                return Err(ExperimentError::training(
-                    texture,
-                    movement,
-                    there,
-                    train_slides,
-                ));
-            }
-            if pool.test.as_ref().map_or(there - train_slides, Vec::len) == 0 {
-                return Err(ExperimentError(format!(
-                    "{texture}, {movement}: no slide is left to test on; train on fewer slides or give more with --test"
-                )));
-            }
-            Ok(pool)
-        };
-        let pools = (0..observed.len())
-            .map(|texture| movements.iter().map(|&m| pool(texture, m)).collect())
-            .collect::<Result<_, _>>()?;
-        let slides = observed
+        let has = |texture, movement| division.of(texture, movement).can_learn();
+        let Enough {
+            textures,
+            movements,
+            slides,
+            mut notes,
+        } = Enough::of(&names, &movements, train_slides, has).ok_or_else(|| {
+            ExperimentError(
+                "no texture has two slides to learn from and another to test on: record more of each, or try another \
+                 --protocol"
+                    .to_owned(),
+            )
+        })?;
+        let mut left_out = 0;
+        let pools: Vec<Vec<Pool>> = textures
             .iter()
+            .map(|&texture| {
+                let of = movements.iter().map(|&movement| {
+                    let divided = division.of(texture, movement);
+                    left_out += divided.left_out;
+                    divided.pool(protocol, slides)
+                });
+                of.collect()
+            })
+            .collect();
+        if left_out > 0 {
+            let left_out = count(left_out as u64, "slide");
+            notes.push(format!(
+                "Left out of the test, as they may be learned from: {left_out}."
+            ));
+        }
+        let unknowns = match division.parts.as_slice() {
+            [] => vec![(0..textures.len()).collect()],
+            parts => {
+                let listed = parts
+                    .iter()
+                    .map(|[session, run]| format!("{session} {run}"));
+                let listed: Vec<String> = listed.map(|part| part.trim().to_owned()).collect();
+                let listed = listed.iter().take(MOST_LISTED).map(String::as_str);
+                let more = if parts.len() > MOST_LISTED {
+                    ", ..."
+                } else {
+                    ""
+                };
+                let listed = listed.collect::<Vec<_>>().join(", ");
+                let turns = count(parts.len() as u64, "part");
+                notes.push(format!("Tested in turn: {turns}, {listed}{more}."));
+                let has = |part: usize, pools: &[Pool]| {
+                    pools.iter().any(|pool| pool.parts.contains(&part))
+                };
+                let of = |part| (0..pools.len()).filter(|&t| has(part, &pools[t])).collect();
+                (0..parts.len()).map(of).collect()
+            }
+        };
+        let kept = textures.iter().map(|&texture| &observed[texture]);
+        let measured = kept
             .flatten()
             .chain(test.iter().flat_map(|(_, slides)| slides.iter().flatten()));
-        let measured = slides.fold(PropertySet::ALL, |set, s| {
+        let measured = measured.fold(PropertySet::ALL, |set, s| {
             set.and(s.measurement.properties.measured())
         });
+        let names = textures
+            .iter()
+            .map(|&texture| names[texture].clone())
+            .collect();
         Ok(Self {
             drawn: protocol != Protocol::Drift,
             measured,
-            ..Self::of(names, movements, pools, train_slides, seed)
+            unknowns,
+            notes,
+            ..Self::of(names, movements, pools, slides, seed)
         })
     }
 
@@ -276,12 +303,13 @@ impl Experiment {
         let pool = |(train, test)| Pool {
             train,
             test: Some(test),
+            parts: Vec::new(),
         };
         let pools = train.into_iter().zip(test);
         let pools = pools.map(|(train, test)| train.into_iter().zip(test).map(pool).collect());
         let pools = pools.collect();
         Ok(Self {
-            unknowns,
+            unknowns: vec![unknowns],
             all: train_slides.is_none(),
             ..Self::of(
                 names,
@@ -301,8 +329,8 @@ impl Experiment {
         seed: u64,
     ) -> Self {
         let pool = |slides| Pool {
-            train: Vec::new(),
             test: Some(slides),
+            ..Pool::default()
         };
         let pools = slides.into_iter();
         let pools = pools.map(|texture| texture.into_iter().map(pool).collect());
@@ -334,8 +362,12 @@ impl Experiment {
     /// The same among a few textures only: one of them is unknown, and the explorer knows that it is one of them.
     #[must_use]
     pub fn among(self, textures: &[u16]) -> Self {
+        let among = |there: &[usize]| {
+            let textures = textures.iter().copied().map(usize::from);
+            textures.filter(|texture| there.contains(texture)).collect()
+        };
         Self {
-            unknowns: textures.iter().copied().map(usize::from).collect(),
+            unknowns: self.unknowns.iter().map(|there| among(there)).collect(),
             candidates: Some(textures.to_vec()),
             ..self
         }
@@ -358,18 +390,55 @@ impl Experiment {
         !self.drawn
     }
 
-    /// Runs of a round: so many, one after the other, learn from the same slides, where these are drawn.
-    pub fn round(&self) -> u64 {
-        self.unknowns.len() as u64
+    /// Textures that are unknown in turn in a round of this number; its runs learn from the same slides.
+    fn unknowns_of(&self, round: u64) -> &[usize] {
+        &self.unknowns[(round % self.unknowns.len() as u64) as usize]
+    }
+
+    /// The number of the round that a run belongs to, and of the run in it.
+    fn round_of(&self, run: u64) -> (u64, usize) {
+        let all: u64 = self
+            .unknowns
+            .iter()
+            .map(|textures| textures.len() as u64)
+            .sum();
+        let mut rest = (run % all) as usize;
+        let mut round = run / all * self.unknowns.len() as u64;
+        for textures in &self.unknowns {
+            if rest < textures.len() {
+                break;
+            }
+            rest -= textures.len();
+            round += 1;
+        }
+        (round, rest)
+    }
+
+    /// Runs that learn from the same slides where these are drawn, one after the other.
+    pub fn rounds(&self, runs: u64) -> Vec<Range<u64>> {
+        let (mut rounds, mut begin) = (Vec::new(), 0);
+        for round in 0.. {
+            if begin >= runs {
+                break;
+            }
+            let end = begin + self.unknowns_of(round).len() as u64;
+            if end > begin {
+                rounds.push(begin..end.min(runs));
+            }
+            begin = end;
+        }
+        rounds
     }
 
     /// Draws run number `run`. The same number gives the same run, whichever thread asks for it.
     pub fn run(&self, run: u64) -> Run<'_> {
         // runs count from below, rounds from above
-        let mut of_round = self.stream(u64::MAX - run / self.round());
+        let (round, _) = self.round_of(run);
+        let mut of_round = self.stream(u64::MAX - round);
+        let begun = self.begin(run);
         Run {
-            orders: self.orders(&mut of_round),
-            ..self.begin(run)
+            orders: self.orders(begun.part, &mut of_round),
+            ..begun
         }
     }
 
@@ -377,7 +446,7 @@ impl Experiment {
     /// Runs are independent then.
     pub fn run_alone(&self, run: u64) -> Run<'_> {
         let mut alone = self.begin(run);
-        alone.orders = self.orders(&mut alone.random);
+        alone.orders = self.orders(alone.part, &mut alone.random);
         alone
     }
 
@@ -388,23 +457,25 @@ impl Experiment {
     }
 
     fn begin(&self, run: u64) -> Run<'_> {
+        let (round, at) = self.round_of(run);
         Run {
             experiment: self,
+            part: (round % self.unknowns.len() as u64) as usize,
             orders: HashMap::new(),
             shown: HashSet::new(),
-            unknown: self.unknowns[(run % self.round()) as usize],
+            unknown: self.unknowns_of(round)[at],
             random: self.stream(run),
         }
     }
 
     /// In which order slides are taken, by movement and how many there are.
-    fn orders(&self, random: &mut ChaCha8Rng) -> HashMap<(usize, usize), Vec<usize>> {
+    fn orders(&self, part: usize, random: &mut ChaCha8Rng) -> HashMap<(usize, usize), Vec<usize>> {
         // As in the reference program, the same places in the session are drawn for all textures: slides of one place
         // share what the session did to them.
         let mut orders: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
         if self.drawn {
             for (movement, pool) in self.pools.iter().flat_map(|pools| pools.iter().enumerate()) {
-                let slides = pool.train.len();
+                let slides = pool.to_learn(part).len();
                 orders.entry((movement, slides)).or_insert_with(|| {
                     let mut order: Vec<usize> = (0..slides).collect();
                     order.shuffle(random);
@@ -416,109 +487,5 @@ impl Experiment {
     }
 }
 
-/// One virtual exploration, ready to begin.
-#[derive(Clone, Debug)]
-pub struct Run<'e> {
-    experiment: &'e Experiment,
-    /// In which order slides are taken, by movement and how many there are; that of time, where nothing is drawn.
-    orders: HashMap<(usize, usize), Vec<usize>>,
-    /// Slides that were shown, by movement and place, where each is shown once.
-    shown: HashSet<(usize, usize)>,
-    /// The texture to be identified.
-    pub unknown: usize,
-    /// Drawn from for the slides; an explorer's own random choices go through it too.
-    pub random: ChaCha8Rng,
-}
-
-impl<'e> Run<'e> {
-    /// Training slides per texture and movement.
-    pub fn training(&self) -> Vec<Vec<Vec<Observation>>> {
-        let of = |(movement, pool): (usize, &Pool)| {
-            let learned = match self.experiment.all {
-                true => 0..pool.train.len(),
-                false => 0..self.experiment.train_slides,
-            };
-            let slides = learned.map(|n| pool.train[self.place(movement, pool, n)].clone());
-            slides.collect()
-        };
-        let pools = self.experiment.pools.iter();
-        pools
-            .map(|pools| pools.iter().enumerate().map(of).collect())
-            .collect()
-    }
-
-    /// Place of the `n`th slide of a pool: the training slides come first, then those to test with.
-    fn place(&self, movement: usize, pool: &Pool, n: usize) -> usize {
-        let order = self.orders.get(&(movement, pool.train.len()));
-        order.map_or(n, |order| order[n])
-    }
-
-    /// The texture table learned from the training slides, as bytes.
-    pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
-        let of = self.experiment;
-        learn_for(
-            &of.expected,
-            method,
-            of.features,
-            &of.names,
-            &of.movements,
-            &self.training(),
-        )
-    }
-
-    pub(crate) fn learn_without(
-        &self,
-        method: Method,
-        out: &[usize],
-    ) -> Result<Vec<u8>, TableError> {
-        let of = self.experiment;
-        let all = (0..).zip(of.names.iter().cloned().zip(self.training()));
-        let kept = all.filter(|(texture, _)| !out.contains(texture));
-        let (names, training): (Vec<_>, Vec<_>) = kept.map(|(_, of)| of).unzip();
-        let expected = &of.expected;
-        learn_for(
-            expected,
-            method,
-            of.features,
-            &names,
-            &of.movements,
-            &training,
-        )
-    }
-
-    /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.
-    pub fn slide(&mut self, movement: usize) -> Option<&'e Observation> {
-        let n = self.draw(movement)?;
-        let of = self.experiment;
-        let pool = &of.pools[self.unknown][movement];
-        Some(match &pool.test {
-            Some(test) => &test[n],
-            None => &pool.train[self.place(movement, pool, of.train_slides + n)],
-        })
-    }
-
-    pub(super) fn draw(&mut self, movement: usize) -> Option<usize> {
-        let pool = &self.experiment.pools[self.unknown][movement];
-        let learned = self.experiment.train_slides;
-        let slides = match &pool.test {
-            Some(test) => test.len(),
-            None => pool.train.len() - learned,
-        };
-        if self
-            .shown
-            .iter()
-            .filter(|slide| slide.0 == movement)
-            .count()
-            == slides
-        {
-            return None;
-        }
-        loop {
-            // drawn again until it is a new one: so the first slide of a run is the same either way
-            let n = self.random.random_range(0..slides);
-            if !self.experiment.once || self.shown.insert((movement, n)) {
-                break Some(n);
-            }
-        }
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -5,8 +5,11 @@ use tactus_core::table::EncodeError;
 
 use crate::data::recordings::{RecordingError, RecordingSet};
 use crate::data::replay::MeasuredSlide;
+pub use crate::eval::enough::Enough;
+use crate::eval::enough::LEAST;
 use crate::eval::evaluate::Method;
 use crate::eval::learn::{Expected, TableError, learn_for, name_finger};
+use crate::eval::learned::note_learned;
 use crate::eval::samples::{note, of_all};
 use crate::eval::show::count;
 
@@ -47,7 +50,28 @@ pub fn at_least_two(slides: usize) -> Result<(), FirstError> {
     Ok(())
 }
 
-/// The table learned from the first slides of every texture and movement: so many, or all where there are fewer.
+/// The textures that [`learn_first`] learns, and from which movements.
+/// Errors: none has two slides.
+pub fn learned_textures(
+    set: &RecordingSet,
+    measured: &[Vec<MeasuredSlide>],
+) -> Result<Enough, FirstError> {
+    let (names, movements) = (set.names(), set.movements());
+    let has = |texture: usize, movement| {
+        let slides = measured.get(texture).into_iter().flatten();
+        slides.filter(|s| s.movement == movement).count()
+    };
+    Enough::of(&names, &movements, LEAST, has).ok_or_else(|| {
+        let most = |&m: &Movement| (0..names.len()).map(|t| has(t, m)).max().unwrap_or(0);
+        let (name, movement) = (names.first(), movements.first());
+        let none = (String::new(), Movement::UNKNOWN);
+        let (name, movement) = (name.unwrap_or(&none.0), movement.unwrap_or(&none.1));
+        FirstError::few(name, *movement, most(movement))
+    })
+}
+
+/// The table learned from the first slides of every texture and movement: so many, or all where there are fewer; the
+/// table notes which. A texture with less than two is left out: see [`learned_textures`].
 pub fn learn_first(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
@@ -57,49 +81,51 @@ pub fn learn_first(
     expected: &Expected,
 ) -> Result<Vec<u8>, FirstError> {
     at_least_two(slides)?;
-    let movements = set.movements();
-    let first = |name: &str, measured: &[MeasuredSlide], movement: Movement| {
-        let same = measured.iter().filter(|s| s.movement == movement);
-        let trials: Vec<_> = same
-            .map(|s| Observation::from(&s.measurement))
-            .take(slides)
-            .collect();
-        let there = trials.len();
-        if there < 2 {
-            return Err(FirstError::few(name, movement, there));
-        }
-        Ok(trials)
+    let Enough {
+        textures,
+        movements,
+        ..
+    } = learned_textures(set, measured)?;
+    let of_texture = |texture: &usize| -> Vec<Vec<&MeasuredSlide>> {
+        let of = |movement: &Movement| {
+            let same = measured[*texture]
+                .iter()
+                .filter(|s| s.movement == *movement);
+            same.take(slides).collect()
+        };
+        movements.iter().map(of).collect()
     };
-    let textures = set.textures().iter().zip(measured);
-    let first = textures.map(|(texture, measured)| {
-        let trials = movements
-            .iter()
-            .map(|&movement| first(&texture.name, measured, movement));
-        trials.collect()
-    });
-    let first: Vec<Vec<Vec<Observation>>> = first.collect::<Result<_, FirstError>>()?;
-    let names = set.names();
+    let first: Vec<Vec<Vec<&MeasuredSlide>>> = textures.iter().map(of_texture).collect();
+    let observed = |slides: &Vec<&MeasuredSlide>| -> Vec<Observation> {
+        let slides = slides.iter();
+        slides.map(|s| Observation::from(&s.measurement)).collect()
+    };
+    let rows = first.iter();
+    let observed: Vec<Vec<Vec<Observation>>> =
+        rows.map(|row| row.iter().map(observed).collect()).collect();
+    let all = set.names();
+    let names: Vec<String> = textures
+        .iter()
+        .map(|&texture| all[texture].clone())
+        .collect();
     let bytes = learn_for(
         expected,
         method.method(),
         features,
         &names,
         &movements,
-        &first,
+        &observed,
     )?;
     // the recordings' notes of the slides that were learned from
-    let moved = |texture: usize| {
-        let keys = set.slides(texture);
-        let of = |movement: &Movement| {
-            let same = measured[texture].iter().filter(|s| s.movement == *movement);
-            let numbers: Vec<u32> = same.map(|s| s.number).take(slides).collect();
-            let used = keys.iter().filter(move |key| numbers.contains(&key.number));
-            used.map(|key| key.labels.moved)
-        };
-        of_all(movements.iter().flat_map(of))
+    let moved = |at: usize| {
+        let keys = set.slides(textures[at]);
+        let used = first[at].iter().flatten();
+        let labels = used.map(|s| keys.iter().find(|key| key.number == s.number));
+        of_all(labels.map(|key| key.and_then(|key| key.labels.moved)))
     };
     let noted = note(&bytes, |texture| moved(texture.into()))?;
     let sensor = set.sensor()?;
-    let named = name_finger(&noted, sensor.finger, sensor.calibrated, &sensor.name);
-    Ok(named?)
+    let named = name_finger(&noted, sensor.finger, sensor.calibrated, &sensor.name)?;
+    let used = first.iter().flatten().flatten();
+    Ok(note_learned(&named, true, used.map(|slide| slide.hash))?)
 }

@@ -10,8 +10,10 @@ use tactus_core::table::{
     Population, Scatter, Sections, Shorter, Table, Tail, WhitenError, Whitened, Whitening,
     whiten_drifting, with_finger, with_lengths, with_sections,
 };
+use tactus_link::for_probe;
 
 use super::calibrate::limits;
+use super::learned::note_learned;
 use super::pace;
 
 /// Three sections, whose lengths are numbers of 16 bits.
@@ -136,7 +138,10 @@ pub fn name_finger(
 /// those statistics.
 /// Errors: A table is invalid, or not of the same textures and movements.
 pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec<u8>, EncodeError> {
-    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let noted = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let learned = noted.learned_slides();
+    let bare = for_probe(&noted);
+    let table = Table::read(&bare).map_err(EncodeError::Invalid)?;
     let shorter = shorter.iter().map(|(ms, table, movements)| {
         let table = Table::read(table).map_err(EncodeError::Invalid)?;
         Ok(Shorter {
@@ -151,7 +156,10 @@ pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec
     let mut out = vec![0; bytes.len() + sections.sum::<usize>()];
     let length = with_lengths(&mut out, &table, &shorter)?.as_bytes().len();
     out.truncate(length);
-    Ok(out)
+    match bare.len() < bytes.len() {
+        true => note_learned(&out, learned.all, learned.hashes.iter().copied()),
+        false => Ok(out),
+    }
 }
 
 /// Features of a slide of a trial, and those of its first part alone.

@@ -10,6 +10,7 @@
 
 use tactus_core::features::{Vector, WHITE_STEPS};
 use tactus_core::table::{Contents, EncodeError, Table, recentre, retell};
+use tactus_link::for_probe;
 
 use crate::eval::alike::alike;
 
@@ -74,7 +75,8 @@ pub fn refresh(table: Table<'_>, slides: &[NewSlide]) -> Result<Refreshed, Refre
         let why = "only tables with whitened features can be refreshed: learn this one again";
         return Err(RefreshError(why.to_owned()));
     };
-    let mut bytes = table.as_bytes().to_vec();
+    // of the new slides it is not noted which they are, so it says that of none
+    let mut bytes = for_probe(&table);
     let mut together = Mean::default();
     let mut own = vec![Mean::default(); table.textures().into()];
     for movement in 0..table.movements().len() as u8 {

@@ -10,6 +10,7 @@ use crate::data::replay::MeasuredSlide;
 use crate::eval::alike::{Alike, alike, nearest};
 use crate::eval::evaluate::{EvaluateError, Method, explorer, play};
 use crate::eval::experiment::Experiment;
+use crate::eval::learned::LeftOut;
 use crate::eval::samples;
 use crate::eval::show::count;
 use crate::eval::table_summary::TableSummary;
@@ -68,6 +69,11 @@ pub struct Pair {
 /// The verdicts on recorded slides with a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Recorded {
+    /// Slides that were left out, as the table was learned from them.
+    #[serde(flatten)]
+    pub left_out: Option<LeftOut>,
+    /// That in a sentence.
+    pub remark: Option<String>,
     /// Explorations of textures that the table has.
     pub explorations: usize,
     /// Verdicts on them.
@@ -146,6 +152,14 @@ impl Report {
         }
         report.advice = advice(&report);
         Ok(report)
+    }
+
+    /// Notes the slides that were left out of the recordings.
+    pub fn leave_out(&mut self, left_out: LeftOut) {
+        if let Some(recorded) = &mut self.recorded {
+            recorded.left_out = Some(left_out);
+            recorded.remark = left_out.in_words();
+        }
     }
 
     /// Explores recorded slides, each once, as `tactus identify --table` does.
@@ -233,6 +247,8 @@ impl Report {
         let (unknown, _, others) = told(&|at| known(at).is_none());
         let missing = |at: &usize| known(*at).is_none();
         self.recorded = Some(Recorded {
+            left_out: None,
+            remark: None,
             explorations,
             known: verdicts,
             unknown: (others > 0).then_some(Verdicts {

@@ -7,6 +7,7 @@ use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS};
 use tactus_core::table::Table;
 use tactus_core::wire::Failure;
 
+use super::learned::LeftOut;
 use super::show::{count, percent};
 
 /// The output of `verify --format json`.
@@ -29,6 +30,9 @@ pub struct Verified {
     /// Share of other textures' episodes of as many slides that would be called the same; `null`: the table has no
     /// other.
     pub false_accept: Option<f64>,
+    /// Slides of recordings that were left out, as the table was learned from them.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<LeftOut>,
     /// One after the other.
     pub slides: Vec<Slide>,
 }
@@ -54,6 +58,7 @@ impl Verified {
             false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
             threshold: config.threshold,
             false_accept: None,
+            left_out: None,
             slides: Vec::new(),
         })
     }

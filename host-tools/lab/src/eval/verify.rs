@@ -15,6 +15,7 @@ use crate::data::replay::MeasuredSlide;
 use crate::eval::evaluate::{EvaluateError, explorer};
 use crate::eval::experiment::{Experiment, Run};
 use crate::eval::learn;
+use crate::eval::learned::note_learned;
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
@@ -295,7 +296,12 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     };
     let length = amend(&mut bytes, &table, change)?.as_bytes().len();
     bytes.truncate(length);
-    Ok(bytes)
+    let all = table.learned_slides().all;
+    Ok(note_learned(
+        &bytes,
+        all,
+        slides.iter().map(|slide| slide.hash),
+    )?)
 }
 
 const MOST_OF_ONE: usize = 4096;

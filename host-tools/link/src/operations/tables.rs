@@ -13,7 +13,7 @@ use crate::person::{Backup, Question, QuestionKind};
 use crate::request::Request;
 use crate::say;
 use crate::session::LinkError;
-use crate::table::PushTable;
+use crate::table::{PushTable, for_probe};
 use crate::{OperationError, Probe};
 
 /// Asks whether to go on, after this was said.
@@ -82,7 +82,9 @@ pub async fn push(probe: &Probe, file: &str, bytes: &[u8]) -> Result<Status> {
         source,
     };
     let table = Table::read(bytes).map_err(|why| of_file(why.into()))?;
-    PushTable::new(bytes).map_err(of_file)?;
+    let bytes = for_probe(&table);
+    let table = Table::read(&bytes).map_err(|why| of_file(why.into()))?;
+    PushTable::new(&bytes).map_err(of_file)?;
     let status = probe.hello().await?;
     table
         .of_finger(status.finger)
@@ -102,9 +104,9 @@ pub async fn push(probe: &Probe, file: &str, bytes: &[u8]) -> Result<Status> {
 
 /// Gives the probe another table instead of the one that it was made from, with somebody's consent; the status then.
 pub async fn replace_table(probe: &Probe, bytes: &[u8], lost: &str, again: &str) -> Result<Status> {
-    let table = Table::read(bytes)?;
+    let bytes = for_probe(&Table::read(bytes)?);
     consent(probe, |_| lost.to_owned()).await?;
-    let now = use_table(probe, table, again).await?;
+    let now = use_table(probe, Table::read(&bytes)?, again).await?;
     let crc = now.table_crc;
     writeln!(probe.words(), "The probe uses it now: checksum {crc:08x}")?;
     Ok(now)

@@ -83,7 +83,8 @@ def evaluate(recordings, **arguments):
 
     recordings: `Recordings`; every texture is the unknown one in turn.
     method: "fused", "fused-cycle", "fused-random", "student-all", "student", "paper", "cycle" or "random".
-    protocol: "interleaved", "blocked" or "drift": which slides are learned from, and which are tested.
+    protocol: "interleaved", "blocked", "drift", "leave-one-session-out" or "leave-one-run-out": which
+        slides are learned from, and which are tested.
     train_slides: slides to learn from, per texture and movement (5).
     runs: virtual explorations (8000). seed: of all draws (1).
     threshold: an exploration ends when a texture is more probable than this (0.99). max_slides: or after so many (10).

@@ -42,6 +42,7 @@ pub(super) fn read_all(bytes: &[u8]) {
     assert!(table.movements().len() <= MAX_MOVEMENTS);
     for texture in 0..table.textures() {
         let _ = (table.moved(texture), table.check_samples());
+        let _ = (table.learned_slides(), table.check_learned());
         for movement in 0..table.movements().len() as u8 {
             let mut whitened = table.whitened(texture, movement);
             whitened.teach(&[5; 14]);

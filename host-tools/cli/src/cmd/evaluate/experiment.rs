@@ -33,6 +33,10 @@ train or validate, and an action is any (movement, property) pair.
 With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and
 tested on the other.
 
+leave-one-session-out and leave-one-run-out test one session, or run of the machine, after the other, and learn from
+the others: the figure for another day. Textures with too few slides are left out and named; where these are half or
+more of them, all are learned from fewer slides.
+
 --novelty leaves one texture after the other out of the table and counts how often it is noticed, and how often a
 known one is taken for new. --verify holds the slides of each texture against its own reference and against those of
 three others, as `tactus verify` does, and counts the errors: at the limits, and where both are equal. These need the
@@ -42,6 +46,7 @@ method fused.
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
+  tactus evaluate --recordings DIR --protocol leave-one-session-out
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --plot pictures

@@ -16,10 +16,11 @@ use crate::cmd::output::{Format, print_json, verdict_rows};
 use crate::cmd::progress::with_progress;
 
 #[derive(Serialize)]
-struct NoveltyFigures {
+struct NoveltyFigures<'n> {
     method: Method,
     protocol: &'static str,
     train_slides: usize,
+    notes: &'n [String],
     runs: u64,
     seed: u64,
     #[serde(flatten)]
@@ -48,6 +49,7 @@ pub(crate) fn leave_one_out(
             method: args.method,
             protocol,
             train_slides,
+            notes: &experiment.notes,
             runs,
             seed,
             novelty,
@@ -60,6 +62,9 @@ pub(crate) fn leave_one_out(
         count(train_slides as u64, "training slide"),
         count(runs, "run")
     )?;
+    for note in &experiment.notes {
+        writeln!(out, "{note}")?;
+    }
     for after in &novelty.novelty {
         let slides = format!(
             "{} slide{}",

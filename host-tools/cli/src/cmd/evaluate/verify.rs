@@ -17,10 +17,11 @@ use crate::cmd::plot::Canvas;
 use crate::cmd::progress::with_progress;
 
 #[derive(Serialize)]
-struct Figures {
+struct Figures<'n> {
     method: Method,
     protocol: &'static str,
     train_slides: usize,
+    notes: &'n [String],
     runs: u64,
     seed: u64,
     #[serde(flatten)]
@@ -46,6 +47,7 @@ pub(super) fn run(
         method: args.method,
         protocol,
         train_slides: experiment.train_slides,
+        notes: &experiment.notes,
         runs: args.runs(),
         seed: args.seed,
         verified,
@@ -61,13 +63,16 @@ pub(super) fn run(
     Ok(())
 }
 
-fn print(figures: &Figures, out: &mut impl Write) -> anyhow::Result<()> {
+fn print(figures: &Figures<'_>, out: &mut impl Write) -> anyhow::Result<()> {
     let runs = count(figures.runs, "run");
     let (protocol, slides, seed) = (figures.protocol, figures.train_slides, figures.seed);
     writeln!(
         out,
         "The same as this one? {protocol}, {slides} training slides, {runs}, seed {seed}"
     )?;
+    for note in figures.notes {
+        writeln!(out, "{note}")?;
+    }
     let percent = |share: f64| format!("{:5.2} %", 100.0 * share);
     for after in &figures.verified.verify {
         writeln!(
