@@ -56,7 +56,7 @@ enum Cli {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Run a long check or all of them: many explorations, faults, fuzzing
+    /// Run a long check or all of them: many explorations, power cuts, faults, fuzzing
     ///
     /// Each part says in one sentence how it ended; with `all`, or with --book, that sentence is a row of a table. An
     /// error if a part misses a limit.

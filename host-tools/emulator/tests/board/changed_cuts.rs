@@ -30,7 +30,7 @@ fn table(talk: &mut Talk) -> Vec<u8> {
 }
 
 /// The table that a rig holds which boots on this store; nothing is to be complained about.
-fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> Vec<u8> {
+pub(crate) fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> (Talk, Vec<u8>) {
     let options = Options {
         store: Some(store),
         ..Options::default()
@@ -56,7 +56,8 @@ fn reboot(elf: &Path, unknown: &Unknown, store: Vec<u8>) -> Vec<u8> {
         assert!(talk.now_ns() < (OPEN_S * 1e9) as u64);
         talk.board().run_ms(10).unwrap();
     }
-    talk.run(ReadTable::default(), TIMEOUT_S, hear).unwrap()
+    let bytes = talk.run(ReadTable::default(), TIMEOUT_S, hear).unwrap();
+    (talk, bytes)
 }
 
 #[test]
@@ -97,7 +98,7 @@ fn an_answer_over_the_link_is_stored_or_not() {
             torn: Torn::ALL[n % Torn::ALL.len()],
             seed: n as u64,
         };
-        let found = reboot(&elf, &unknown, left_by(&before, &writes, cut));
+        let (_, found) = reboot(&elf, &unknown, left_by(&before, &writes, cut));
         assert!(found == old || found == new, "{cut:?} of {}", writes.len());
         left_old += usize::from(found == old);
         left_new += usize::from(found == new);
