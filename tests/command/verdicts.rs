@@ -5,14 +5,13 @@ use tactus_tests::{count, data};
 use crate::{Scratch, array};
 
 /// Names of the verdicts.
-const VERDICTS: [&str; 5] = ["right", "changed", "new", "wrong", "undecided"];
+const VERDICTS: [&str; 4] = ["right", "new", "wrong", "undecided"];
 
 /// The verdict that `identify` printed, by its place in [`VERDICTS`].
 fn told(shown: &str) -> usize {
     let name = match shown.lines().rev().find(|line| line.contains(" after ")) {
         Some(line) if line.starts_with("It is not one of") => "new",
         Some(line) if line.starts_with("Not sure") => "undecided",
-        Some(line) if line.starts_with("It is like ") => "changed",
         Some(line) if line.starts_with("It is ") && shown.contains("\nRight.") => "right",
         Some(line) if line.starts_with("It is ") && shown.contains("\nWrong:") => "wrong",
         _ => panic!("{shown}"),
@@ -33,7 +32,7 @@ fn compare(at: &Scratch, train_slides: u32, method: &str, more: &str, times: u64
     let learn =
         format!("learn --recordings FOLDER --train-slides {train_slides} --method {method}");
     at.printed(&format!("{learn} --out table"));
-    let (mut counts, mut runs) = ([0.0; 5], 0.0);
+    let (mut counts, mut runs) = ([0.0; 4], 0.0);
     for material in materials {
         for _ in 0..times {
             runs += 1.0;

@@ -238,11 +238,10 @@ fn new_materials_are_noticed_and_a_session_is_followed() {
     let told = (after.verdicts_new, after.verdicts_known);
     let after = after.novelty;
     assert!(
-        // changed is noticed, too: it is told as not the texture that was learned
-        told.0.new + told.0.changed >= 0.85 && told.0.right == 0.0 && told.1.right >= 0.9,
+        told.0.new >= 0.75 && told.0.right == 0.0 && told.1.right >= 0.95,
         "{told:?}"
     );
-    assert!(after[1].unknown.noticed() >= 0.80 && after[1].known.new <= 0.03);
+    assert!(after[1].unknown.new >= 0.6 && after[1].known.new <= 0.03);
     let drift = recorded(&folder, Protocol::Drift, 5);
     let lives = [[false, false], [true, false], [true, true]];
     let [none, alone, asking] = lives.map(|[learns, asks]| session(&drift, learns, asks));

@@ -297,7 +297,7 @@
     const of = `after ${one.slides} ${one.slides === 1 ? "slide" : "slides"}`;
     const name = { name: one.texture };
     if (one.told === "sure") headline(["It is ", name, `, ${sure(one.probability)} sure ${of}.`], "sure");
-    if (one.told === "changed") headline(["It feels like ", name, ", but not as I learned it."], "changed");
+    if (one.told === "changed") headline(["It is ", name, `, but not as I learned it: ${sure(one.probability)} sure ${of}.`], "changed");
     if (one.told === "new") headline([`This is none of those I know, ${of}.`], "new");
     if (one.told === "undecided") headline(["Not sure; most likely ", name, `, ${Mind.percent(one.probability)} ${of}.`]);
     if (source !== "sim") {
@@ -308,7 +308,7 @@
     const truth = nameOf(asked.number);
     const taught = known.numbers[one.index] === null ? one.texture : null;
     const right = one.told === "new" ? !isKnown(asked.number) && !lessons.has(asked.number) : one.texture === truth || taught !== null && lessons.get(asked.number) === taught;
-    const judged = one.told === "undecided" ? "" : right ? " Right." : one.told === "changed" && !right ? " It is something else." : " That is wrong.";
+    const judged = one.told === "undecided" ? "" : right ? " Right." : " That is wrong.";
     at("truth").textContent = `Under the finger: ${truth}.${judged}`;
     if (one.wants_label) {
       at("teach").hidden = false;

@@ -17,7 +17,7 @@ pub struct Look {
     pub texture: u16,
     /// Probability of all others together.
     pub doubt: f32,
-    /// Whether it looks like one of the candidates, and as that was learned.
+    /// Whether it is probable enough, and looks like one of the candidates, and as that was learned.
     pub known: bool,
 }
 
@@ -91,9 +91,8 @@ impl<const N: usize> Explorer<'_, N> {
                 doubt += probability;
             }
         }
-        let rather_new = self.log_odds.is_some_and(|log_odds| log_odds > 0.0);
         let sure = most > self.config.threshold;
-        let known = sure && !rather_new && !self.is_unknown() && !self.is_changed();
+        let known = sure && self.fits() && !self.is_changed();
         Look {
             texture,
             doubt,

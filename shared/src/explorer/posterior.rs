@@ -28,8 +28,15 @@ const FLOOR: i32 = -(1 << 28);
 const UNKNOWN_OVER: [f32; 2] = [2.0, 1.5];
 /// Log-odds up to which a verdict is certain enough to learn from.
 const CERTAIN: f32 = -2.0;
-/// Fewest slides after which a texture may be called unknown.
+/// Fewest slides after which a texture may be called unknown, unless it is [`FAR`].
 const UNKNOWN_SLIDES: u8 = 2;
+/// Share of the known textures that one slide may make unknown.
+const FAR: f32 = 0.0005;
+/// Share of the known textures that fit too badly to be told as sure in the first [`PATIENT`] slides: the next one says
+/// more. Afterwards whatever is not unknown fits.
+const POOR_FIT: f32 = 0.1;
+/// See [`POOR_FIT`].
+const PATIENT: u8 = 4;
 
 /// Textures that [`Explorer::leading`] names.
 pub const LEADING: usize = 3;
@@ -41,11 +48,11 @@ pub struct Verdict {
     pub texture: u16,
     /// Its posterior probability.
     pub probability: f32,
-    /// Whether that exceeds the threshold, and it is rather one of the candidates than none.
+    /// Whether that exceeds the threshold, and the slides fit the texture.
     pub sure: bool,
     /// Whether it is rather none of them.
     pub unknown: bool,
-    /// Whether it is the most probable one, but not as it was learned: worn, drifted, or something much like it.
+    /// Whether it is sure, but not as it was learned: worn, drifted, or something much like it.
     pub changed: bool,
     /// Log-odds that it is none of them, where the method can tell; with a calibrated table, by how much its score
     /// exceeds the limit.
@@ -57,7 +64,7 @@ pub struct Verdict {
 pub enum VerdictKind {
     /// "It is this texture": a name told as sure.
     Sure,
-    /// "It is this texture, but not as I learned it."
+    /// "It is this texture, but not as I learned it": a name told as sure, with a remark.
     Changed,
     /// "It is none of those I know."
     New,
@@ -187,9 +194,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
         let sure = best.sure && self.slides > 0;
-        let probable = best.probability > self.config.threshold;
-        let unknown = best.unknown || best.changed && probable;
-        let unknown = unknown && self.slides >= UNKNOWN_SLIDES;
+        let enough = self.limits.is_some() || self.slides >= UNKNOWN_SLIDES;
+        let unknown = best.unknown && enough;
         (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
     }
 
@@ -201,30 +207,44 @@ impl<'t, const N: usize> Explorer<'t, N> {
 
     /// Whether the texture is rather none of the candidates, as far as can be told.
     pub fn is_unknown(&self) -> bool {
-        if self.is_calibrated() {
-            return self.log_odds.is_some_and(|over| over > 0.0);
-        }
         let [at_once, later] = UNKNOWN_OVER;
-        let limit = if self.slides < UNKNOWN_SLIDES {
-            at_once
-        } else {
-            later
+        let limit = match (&self.limits, self.slides < UNKNOWN_SLIDES) {
+            (Some(limits), true) => self.above(limits, FAR).max(0.0),
+            (Some(_), false) => 0.0,
+            (None, true) => at_once,
+            (None, false) => later,
         };
         self.log_odds.is_some_and(|log_odds| log_odds > limit)
+    }
+
+    /// Whether the slides are as like one of the candidates as those of known textures mostly are: a texture is not sure
+    /// otherwise, however probable. True where the method or the table cannot tell.
+    pub fn fits(&self) -> bool {
+        let limit = match &self.limits {
+            Some(limits) if self.slides <= PATIENT => self.above(limits, POOR_FIT).min(0.0),
+            _ => 0.0,
+        };
+        self.log_odds.is_none_or(|log_odds| log_odds <= limit)
+    }
+
+    /// By how much the limit for this share of false alarms is above that for the share that is wanted.
+    fn above(&self, limits: &Limits, share: f32) -> f32 {
+        let [this, wanted] = [Some(share), self.config.false_alarm]
+            .map(|share| limits.limit(Against::Drifted, self.slides, share));
+        this - wanted
     }
 
     fn is_calibrated(&self) -> bool {
         self.limits.is_some()
     }
 
-    /// Whether the texture, if it is one of the candidates, is not as it was learned: without the drift that the table
-    /// expects it would be none of them. Never with a table that is not calibrated, or expects no drift.
-    pub fn is_changed(&self) -> bool {
+    pub(super) fn is_changed(&self) -> bool {
         self.changed_by().is_some_and(|over| over > 0.0)
     }
 
     /// By how much the slides are less like any of the candidates, as these were learned, than they may be: above 0,
-    /// the texture has [changed](Self::is_changed). `None` before the first slide, and where the table cannot tell.
+    /// the texture has changed, as far as it is one of them, for without the drift that the table expects it would be
+    /// none. `None` before the first slide, and where the table is not calibrated or expects no drift.
     pub fn changed_by(&self) -> Option<f32> {
         let drifts = self.table.drift().is_some_and(|drift| !drift.is_none());
         let limits = self.limits.filter(|_| drifts && self.slides > 0)?;
@@ -282,7 +302,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
     /// properties alone: one in ten such updates would be wrong.
     pub fn is_certain(&self) -> bool {
         let known = if self.is_calibrated() {
-            !self.is_unknown() && !self.is_changed()
+            self.fits() && !self.is_changed()
         } else {
             self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN)
         };
@@ -324,18 +344,18 @@ impl<'t, const N: usize> Explorer<'t, N> {
             changed: false,
             log_odds: self.log_odds,
         };
-        best.changed = self.config.open && !best.unknown && self.is_changed();
-        let rather_new = self.config.open && self.log_odds.is_some_and(|log_odds| log_odds > 0.0);
+        let fits = !self.config.open || self.fits();
         for (&probability, texture) in self.posterior.iter().zip(0..) {
             if probability > best.probability {
                 best = Verdict {
                     texture,
                     probability,
-                    sure: probability > self.config.threshold && !rather_new && !best.changed,
+                    sure: probability > self.config.threshold && fits,
                     ..best
                 };
             }
         }
+        best.changed = self.config.open && best.sure && self.is_changed();
         best
     }
 

@@ -28,7 +28,7 @@ pub struct Judgement {
     pub sure: bool,
     /// It is rather none of them.
     pub unknown: bool,
-    /// It is the first one, but not as it was learned.
+    /// It is surely the first one, but not as it was learned: the probe asks the person whether it is.
     pub changed: bool,
     /// Further slides may decide.
     pub open: bool,
@@ -55,11 +55,6 @@ impl Judgement {
         self.sure = answer == Answer::Same;
         self.unknown = answer == Answer::Different;
         self.changed = false;
-    }
-
-    /// Returns true if the probe is to ask the person whether it is the first one.
-    pub fn is_changed(&self) -> bool {
-        self.changed && !self.unknown
     }
 }
 

@@ -342,7 +342,7 @@ pub struct Verdict {
     pub slides: u8,
     /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
     pub wants_label: bool,
-    /// Whether it is the texture named, but not as it was learned.
+    /// Whether it is sure, but the texture is not as it was learned.
     pub changed: bool,
 }
 

@@ -13,6 +13,9 @@ use super::oracle::{
 const DRAWS: usize = 8;
 /// Slides of an episode that have limits of their own.
 pub const SLIDES: usize = 3;
+/// Shares of drawn slides: see [`Judge::tell`].
+const FAR: f64 = 0.00025;
+const POOR_FIT: f64 = 0.05;
 
 /// Standard deviations of the drift: of the bands, ln, and of traction as a share of its mean.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -260,16 +263,19 @@ impl Judge {
         let least = surprises.iter().copied().fold(f64::INFINITY, f64::min);
         let sum: f64 = surprises.iter().map(|a| (least - a).exp()).sum();
         let best = surprises.iter().position(|a| *a == least).unwrap();
-        let over = |which: usize| {
+        let over = |which: usize, alpha: f64| {
             let limits = self.limits[which].iter().take(k);
             let limits = limits.map(|[u, beta]| u + beta * (0.1 / alpha).ln());
             self.score(z, k, which) > limits.fold(f64::INFINITY, f64::min)
         };
-        let told = match () {
-            () if over(0) => VerdictKind::New,
-            () if over(1) => VerdictKind::Changed,
-            () if 1.0 / sum > SURE => VerdictKind::Sure,
-            () => VerdictKind::Undecided,
+        // one slide makes only what is far new; in the first four slides a name must fit better than 19 of 20 slides
+        let new = over(0, if k == 1 { FAR } else { alpha });
+        let fits = !over(0, if k <= 4 { POOR_FIT } else { alpha });
+        let told = match 1.0 / sum > SURE && fits {
+            _ if new => VerdictKind::New,
+            true if over(1, alpha) => VerdictKind::Changed,
+            true => VerdictKind::Sure,
+            false => VerdictKind::Undecided,
         };
         (told, best)
     }

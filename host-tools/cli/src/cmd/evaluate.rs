@@ -82,8 +82,8 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         "what the user is told, after {:.2} slides (mean)",
         e.mean_slides_told
     )?;
-    for (name, value, remark) in verdict_rows(&e.verdicts) {
-        writeln!(out, "{}", row(name, share(value) + &remark))?;
+    for (name, value) in verdict_rows(&e.verdicts) {
+        writeln!(out, "{}", row(name, share(value)))?;
     }
     writeln!(out, "where the texture is known to be one of these")?;
     let s = &e.summary;

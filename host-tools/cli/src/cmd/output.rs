@@ -47,16 +47,13 @@ pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyh
     Ok(())
 }
 
-/// Verdicts by name, as people read them, with a remark behind the share.
-pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64, String); 5] {
-    let named = v.changed_right.map_or(String::new(), |share| {
-        format!(" (the right one in {:.1} %)", 100.0 * share)
-    });
+/// Verdicts by name, as people read them.
+pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
     [
-        ("right", v.right, String::new()),
-        ("like one, but changed", v.changed, named),
-        ("none of those known", v.new, String::new()),
-        ("wrong", v.wrong, String::new()),
-        ("undecided", v.undecided, String::new()),
+        ("right", v.right),
+        ("none of those known", v.new),
+        ("wrong", v.wrong),
+        ("undecided", v.undecided),
+        ("told to have changed", v.changed),
     ]
 }

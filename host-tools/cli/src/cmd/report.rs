@@ -189,9 +189,9 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
             ("others", unknown),
         ];
         for (kind, verdicts) in of.into_iter().filter_map(|(k, v)| Some((k, v?))) {
-            let told = verdict_rows(verdicts).map(|(name, share, remark)| {
+            let told = verdict_rows(verdicts).map(|(name, share)| {
                 let share = percent((1000.0 * share).round() / 1000.0);
-                format!("{name} {share}{remark}")
+                format!("{name} {share}")
             });
             writeln!(out, "  {kind}: {}", told.join(", "))?;
         }

@@ -13,8 +13,8 @@ pub(crate) struct Belief {
     pub texture: usize,
     /// Its posterior probability.
     pub probability: f32,
-    /// True if it is rather none of the known textures: then no threshold makes the texture sure.
-    rather_new: bool,
+    /// True if the slides fit the texture: otherwise no threshold makes it sure.
+    fits: bool,
     is_new: bool,
     /// True if it differs from the texture as it was learned.
     is_changed: bool,
@@ -32,17 +32,14 @@ impl Course {
     /// The verdict at this threshold, the slides until then, and the most probable texture. The choice of movements
     /// does not depend on the threshold, so the run at one is the beginning of the run at a higher one.
     pub fn told(&self, threshold: f32) -> (VerdictKind, usize, usize) {
-        let is_sure = |b: &Belief| b.probability > threshold && !b.rather_new && !b.is_changed;
-        // that takes two slides: see `Explorer::verdict`
-        let is_changed = |at, b: &Belief| at > 0 && b.probability > threshold && b.is_changed;
-        let mut beliefs = self.beliefs.iter().enumerate();
-        let over = beliefs.position(|(at, b)| is_sure(b) || is_changed(at, b));
+        let mut beliefs = self.beliefs.iter();
+        let over = beliefs.position(|b| b.probability > threshold && b.fits);
         let at = over.unwrap_or(self.beliefs.len().saturating_sub(1));
         let last = self.beliefs.get(at);
         let told = match last {
-            Some(b) if over.is_some() && is_sure(b) => VerdictKind::Sure,
+            Some(b) if over.is_some() && b.is_changed => VerdictKind::Changed,
+            Some(_) if over.is_some() => VerdictKind::Sure,
             Some(b) if b.is_new => VerdictKind::New,
-            Some(b) if b.is_changed => VerdictKind::Changed,
             _ => VerdictKind::Undecided,
         };
         (
@@ -72,9 +69,9 @@ pub fn courses(
             beliefs.push(Belief {
                 texture: best.texture.into(),
                 probability: best.probability,
-                rather_new: config.open && best.log_odds.is_some_and(|odds| odds > 0.0),
+                fits: !config.open || explorer.fits(),
                 is_new: best.unknown,
-                is_changed: best.changed,
+                is_changed: config.open && explorer.changed_by().is_some_and(|by| by > 0.0),
             });
         });
         Course {

@@ -23,61 +23,8 @@ pub struct After {
     pub slides: usize,
     /// Textures of the table.
     pub known: Verdicts,
-    /// Textures that were left out of it.
-    pub unknown: OfUnknown,
-}
-
-/// Shares of the verdicts on a texture that the table does not have, 0 to 1; they add up to 1.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct OfUnknown {
-    /// Verdict: none of the known textures. Right.
-    pub new: f64,
-    /// Verdict: like one of them, but changed. Noticed, too.
-    pub changed: f64,
-    /// Verdict: one of them, as sure.
-    pub wrong: f64,
-    /// Verdict: "not sure".
-    pub undecided: f64,
-}
-
-impl OfUnknown {
-    /// Share that was noticed, as new or as changed.
-    pub fn noticed(&self) -> f64 {
-        self.new + self.changed
-    }
-}
-
-impl After {
-    /// Verdicts on textures that were left out, in the words of those that were not: `right` is 0.
-    pub fn unknown(&self) -> Verdicts {
-        let OfUnknown {
-            new,
-            changed,
-            wrong,
-            undecided,
-        } = self.unknown;
-        Verdicts {
-            right: 0.0,
-            new,
-            changed,
-            // no name is right
-            changed_right: None,
-            wrong,
-            undecided,
-        }
-    }
-}
-
-impl From<Verdicts> for OfUnknown {
-    fn from(told: Verdicts) -> Self {
-        Self {
-            new: told.new,
-            changed: told.changed,
-            // no name is right
-            wrong: told.right + told.wrong,
-            undecided: told.undecided,
-        }
-    }
+    /// Textures that were left out of it: `new` is right, and no name is.
+    pub unknown: Verdicts,
 }
 
 /// The result of leaving textures out.
@@ -147,7 +94,7 @@ pub fn leave_one_out(
     let after = |after| After {
         slides: after + 1,
         known: told(1, after),
-        unknown: told(0, after).into(),
+        unknown: told(0, after),
     };
     Ok(Novelty {
         novelty: (0..SLIDES).map(after).collect(),

@@ -251,10 +251,7 @@ impl Report {
             remark: None,
             explorations,
             known: verdicts,
-            unknown: (others > 0).then_some(Verdicts {
-                changed_right: None,
-                ..unknown
-            }),
+            unknown: (others > 0).then_some(unknown),
             mean_slides,
             not_in_table: (0..whole.len())
                 .filter(missing)

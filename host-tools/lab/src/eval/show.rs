@@ -289,8 +289,8 @@ impl<'t, W: Write> Show<'t, W> {
             }
             VerdictKind::Changed => writeln!(
                 self.out,
-                "\nIt is like {name}, but not as I learned it, after {slides}: worn, drifted, or something much like \
-                 it."
+                "\nIt is {name}, but not as I learned it: sure to {p:.1} % after {slides}. It is worn, or has drifted, \
+                 or is something much like it."
             ),
             VerdictKind::Sure => {
                 writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")
@@ -306,10 +306,10 @@ impl<'t, W: Write> Show<'t, W> {
 /// Returns true if a verdict is right about the texture of this name; `None` if it is undecided.
 pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
     match verdict.kind() {
-        VerdictKind::Sure => Some(table.name(verdict.texture) == Some(truth)),
+        VerdictKind::Sure | VerdictKind::Changed => {
+            Some(table.name(verdict.texture) == Some(truth))
+        }
         VerdictKind::New => Some(table.find(truth).is_none()),
-        // for another texture it is no wrong answer: the verdict is that the texture is not as learned
-        VerdictKind::Changed => (table.name(verdict.texture) == Some(truth)).then_some(true),
         VerdictKind::Undecided => None,
     }
 }

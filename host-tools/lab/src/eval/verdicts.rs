@@ -3,38 +3,33 @@
 use serde::{Deserialize, Serialize};
 use tactus_core::explorer::VerdictKind;
 
-/// Shares of explorations, 0 to 1; they add up to 1.
+/// Shares of explorations, 0 to 1; all but `changed` add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Verdicts {
     /// Verdict: the right name, as sure.
     pub right: f64,
-    /// Verdict: a texture that has changed since it was learned. Only calibrated tables give this verdict.
-    pub changed: f64,
-    /// Share of right names among these; `None` if there were none. Not a part of the sum.
-    #[serde(default)]
-    pub changed_right: Option<f64>,
     /// Verdict: none of the known textures.
     pub new: f64,
     /// Verdict: a wrong name, as sure.
     pub wrong: f64,
     /// Verdict: "not sure", with any name as the most likely one.
     pub undecided: f64,
+    /// Of the names told as sure, right or wrong, those with the remark that the texture has changed since it was
+    /// learned. Only calibrated tables make it.
+    pub changed: f64,
 }
 
 impl Verdicts {
     /// Counts the verdict of each exploration, with true if the most probable texture was the right one.
     pub fn of(told: impl IntoIterator<Item = (VerdictKind, bool)>) -> Self {
         let mut counts = Self::default();
-        let (mut all, mut named) = (0.0_f64, 0.0_f64);
+        let mut all = 0.0_f64;
         for (told, is_right) in told {
             all += 1.0;
-            if told == VerdictKind::Changed && is_right {
-                named += 1.0;
-            }
+            counts.changed += f64::from(u8::from(told == VerdictKind::Changed));
             *match told {
-                VerdictKind::Sure if is_right => &mut counts.right,
-                VerdictKind::Sure => &mut counts.wrong,
-                VerdictKind::Changed => &mut counts.changed,
+                VerdictKind::Sure | VerdictKind::Changed if is_right => &mut counts.right,
+                VerdictKind::Sure | VerdictKind::Changed => &mut counts.wrong,
                 VerdictKind::New => &mut counts.new,
                 VerdictKind::Undecided => &mut counts.undecided,
             } += 1.0;
@@ -42,20 +37,16 @@ impl Verdicts {
         let share = |count: f64| count / all.max(1.0);
         Self {
             right: share(counts.right),
-            changed: share(counts.changed),
-            changed_right: (counts.changed > 0.0).then(|| named / counts.changed),
             new: share(counts.new),
             wrong: share(counts.wrong),
             undecided: share(counts.undecided),
+            changed: share(counts.changed),
         }
     }
 
     /// The same of textures that the table does not have: no name is right.
     pub(crate) fn of_unknown(told: impl IntoIterator<Item = VerdictKind>) -> Self {
-        Self {
-            changed_right: None,
-            ..Self::of(told.into_iter().map(|told| (told, false)))
-        }
+        Self::of(told.into_iter().map(|told| (told, false)))
     }
 }
 
@@ -76,12 +67,11 @@ mod tests {
             (VerdictKind::Changed, false),
         ];
         let expected = Verdicts {
-            right: 0.25,
-            changed: 0.25,
-            changed_right: Some(0.5),
+            right: 0.375,
             new: 0.25,
-            wrong: 0.125,
+            wrong: 0.25,
             undecided: 0.125,
+            changed: 0.25,
         };
         assert_eq!(Verdicts::of(told), expected);
         assert_eq!(Verdicts::of([]), Verdicts::default());

@@ -27,7 +27,7 @@ impl Standing {
         Self {
             posterior: explorer.posterior().to_vec(),
             log_odds: explorer.log_odds(),
-            changed: explorer.is_changed(),
+            changed: explorer.best().changed,
             changed_by: explorer.changed_by(),
         }
     }

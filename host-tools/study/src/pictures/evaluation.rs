@@ -13,14 +13,13 @@ const FEW: usize = 12;
 /// Verdicts of these explorations at this threshold, row by row: presented textures, and columns of verdicts.
 pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow::Result<Figure> {
     let known = names.len();
-    let mut counts = vec![vec![0_u64; known + 3]; known];
+    let mut counts = vec![vec![0_u64; known + 2]; known];
     for course in courses {
         let (told, _, texture) = course.told(threshold);
         let column = match told {
-            VerdictKind::Sure => texture,
-            VerdictKind::Changed => known,
-            VerdictKind::New => known + 1,
-            VerdictKind::Undecided => known + 2,
+            VerdictKind::Sure | VerdictKind::Changed => texture,
+            VerdictKind::New => known,
+            VerdictKind::Undecided => known + 1,
         };
         counts[course.presented][column] += 1;
     }
@@ -33,8 +32,7 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
             let share = count as f64 / all as f64;
             let (told, colour) = match column {
                 c if c == texture => ("told as sure, right".to_owned(), COLOURS[0]),
-                c if c == known => ("told to have changed".to_owned(), AVOIDED),
-                c if c == known + 1 => ("told to be none of those known".to_owned(), AVOIDED),
+                c if c == known => ("told to be none of those known".to_owned(), AVOIDED),
                 c if c > known => ("told as not sure".to_owned(), AVOIDED),
                 c => (format!("told as sure to be {}", names[c]), COLOURS[1]),
             };
@@ -62,24 +60,23 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
         .iter()
         .map(|&t| format!("{}: {}", t + 1, names[t]));
     let numbers = (1..=known).map(|number| number.to_string());
-    let columns = numbers.chain(["C", "N", "?"].map(str::to_owned));
+    let columns = numbers.chain(["N", "?"].map(str::to_owned));
     let verdicts = verdicts(courses, threshold);
     let about = format!(
-        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with a changed one, \
-         {:.1} % with none of those known and {:.1} % undecided.",
+        "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with none of those \
+         known and {:.1} % undecided.",
         courses.len(),
         100.0 * verdicts.right,
         100.0 * verdicts.wrong,
-        100.0 * verdicts.changed,
         100.0 * verdicts.new,
         100.0 * verdicts.undecided
     );
     let below = if known > FEW {
-        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of \
-         those known (N), not sure (?)."
+        "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), \
+         not sure (?)."
     } else {
-        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: changed (C), none of those \
-         known (N), not sure (?)."
+        "In % of the row. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), \
+         not sure (?)."
     };
     Grid {
         id: "confusion".to_owned(),

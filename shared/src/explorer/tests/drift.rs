@@ -384,8 +384,13 @@ impl Recipe {
             let p = (l - most).exp() / sum;
             assert!((f64::from(*found) - p).abs() < p_off, "{found} {p}");
         }
-        let limit = |against| f64::from(self.limits.limit(against, slides, None));
-        let over = background - most - limit(Against::Drifted);
+        let limit = |against, share| f64::from(self.limits.limit(against, slides, share));
+        let by = |share| background - most - limit(Against::Drifted, share);
+        let over = by(None);
+        let (far, fits) = (by(Some(0.0005)) > 0.0, by(Some(0.1)) <= 0.0);
+        let new = if slides == 1 { far } else { over > 0.0 };
+        let fits = if slides <= 4 { fits } else { over <= 0.0 };
+        let sure = 1.0 / sum > 0.99 && fits;
         let found = f64::from(explorer.log_odds().unwrap());
         assert!(
             (found - over).abs() < off + share * over.abs(),
@@ -394,11 +399,11 @@ impl Recipe {
         let (likelihoods, background) = self.decide(episode, false);
         let most = likelihoods.iter().copied().fold(f64::MIN, f64::max);
         let drifts = self.drifts.iter().flatten().any(|variance| *variance > 0.0);
-        let changed = background - most > limit(Against::Same) && drifts;
-        let told = (over > 0.0, over <= 0.0 && changed);
+        let changed = background - most > limit(Against::Same, None) && drifts;
+        let told = (new, sure, sure && changed);
         let best = explorer.best();
         agreement.all += 1;
-        agreement.same += i32::from(told == (best.unknown, best.changed));
+        agreement.same += i32::from(told == (best.unknown, best.sure, best.changed));
         agreement.news += i32::from(best.unknown);
         agreement.changes += i32::from(best.changed);
         let (slides, _) = self.known[0][0];

@@ -3,7 +3,6 @@
 use super::lists::{Entry, List};
 use super::{Answer, CLICK, Choice, DARK_AFTER, Handheld, Job, LEARNED, NO_WORDS, Page};
 use crate::handheld::button::Press;
-use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::spelling::{Spelling, Taken};
 
@@ -34,7 +33,10 @@ impl Handheld<'_> {
 
     fn pressed(&mut self, press: Press) {
         self.fresh = true;
-        let asks = self.judgement.as_ref().is_some_and(Judgement::is_changed);
+        let asks = self
+            .judgement
+            .as_ref()
+            .is_some_and(|judgement| judgement.changed);
         match (&mut self.page, press) {
             // no sound while the table is at work
             (Page::Thinking | Page::Saving, _) => return,

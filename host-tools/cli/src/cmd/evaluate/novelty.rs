@@ -71,7 +71,7 @@ pub(crate) fn leave_one_out(
             after.slides,
             if after.slides == 1 { " " } else { "s" }
         );
-        let new = in_words(&after.unknown());
+        let new = in_words(&after.unknown);
         writeln!(out, "  after {slides}  of a new texture  {new}")?;
         writeln!(
             out,
@@ -92,6 +92,6 @@ pub(crate) fn leave_one_out(
 
 fn in_words(verdicts: &Verdicts) -> String {
     let words = verdict_rows(verdicts);
-    let words = words.map(|(name, share, remark)| format!("{name} {:.1} %{remark}", share * 100.0));
+    let words = words.map(|(name, share)| format!("{name} {:.1} %", share * 100.0));
     words.join(", ")
 }

@@ -192,8 +192,9 @@ impl Monitor {
                     let note = format!("none that I know, most like {name}, after {after}");
                     ("It is none that I know".to_owned(), note)
                 } else if verdict.changed {
-                    let note = format!("like {name}, but not as it was learned, after {after}");
-                    (format!("It is like {name}, but changed"), note)
+                    let note =
+                        format!("it is {name}, but not as it was learned: {p:.1} % after {after}");
+                    (format!("It is {name}, but changed"), note)
                 } else if verdict.sure {
                     let note = format!("it is {name}: {p:.1} % after {after}");
                     (format!("It is {name}"), note)
