@@ -177,10 +177,10 @@ fn identify_recorded(
             drift: Some(args.expecting.drift),
             ..Expected::default()
         });
-        for note in experiment.notes() {
+        for note in &experiment.notes {
             notice(note);
         }
-        let at = experiment.names().iter().position(|other| other == name);
+        let at = experiment.names.iter().position(|other| other == name);
         let at = at.with_context(|| {
             format!("{name} has too few slides to learn from, and one to present")
         })?;

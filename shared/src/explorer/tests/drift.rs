@@ -400,12 +400,15 @@ impl Recipe {
         let most = likelihoods.iter().copied().fold(f64::MIN, f64::max);
         let drifts = self.drifts.iter().flatten().any(|variance| *variance > 0.0);
         let changed = background - most > limit(Against::Same, None) && drifts;
-        let told = (new, sure, sure && changed);
+        let told = (new, fits, changed, sure, sure && changed);
         let best = explorer.best();
+        let is_changed = explorer.changed_by().is_some_and(|by| by > 0.0);
+        let fit = explorer.fits();
+        let here = (best.unknown, fit, is_changed, best.sure, best.changed);
         agreement.all += 1;
-        agreement.same += i32::from(told == (best.unknown, best.sure, best.changed));
+        agreement.same += i32::from(told == here);
         agreement.news += i32::from(best.unknown);
-        agreement.changes += i32::from(best.changed);
+        agreement.changes += i32::from(is_changed);
         let (slides, _) = self.known[0][0];
         if self.paces.is_empty() && self.known.iter().flatten().all(|(n, _)| *n == slides) {
             let p: Vec<f64> = explorer.posterior().iter().map(|p| (*p).into()).collect();
