@@ -1,9 +1,11 @@
 //! Anybody's files as recordings: looked at once, to find what they do not say, and written in the project's format.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use tactus_core::features::Movement;
@@ -11,15 +13,17 @@ use tactus_core::sensor::FingerCode;
 
 use super::cut::Parts;
 use super::resample::RATES_HZ;
-use super::settings::{SETTINGS, Settings};
+use super::settings::{Named, SETTINGS, Settings};
 use super::signals::Signals;
 use crate::data::quality::SlideChecks;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
 
+mod memory;
 mod paths;
 mod reading;
 
+pub use memory::InMemory;
 use paths::files;
 use reading::{How, liveliest, rounded};
 
@@ -76,8 +80,42 @@ pub struct Survey {
     pub textures: Vec<String>,
     /// Counts of P_DC per unit of its column; `None` where there is none, or it never changes.
     pub pressure_gain: Option<f64>,
-    from: PathBuf,
+    source: Source,
     settings: Settings,
+}
+
+/// The place of the signals.
+#[derive(Clone, Debug)]
+enum Source {
+    /// Files below a folder, or one file.
+    Files(PathBuf),
+    /// Memory: a path is the number of a signal.
+    Memory(Arc<[InMemory]>),
+}
+
+impl Source {
+    /// The signals of a path, and its name in errors.
+    fn signals(&self, path: &str) -> Result<(Cow<'_, Signals>, PathBuf)> {
+        match self {
+            Self::Files(from) => {
+                let folder = if from.is_dir() {
+                    from
+                } else {
+                    from.parent().unwrap_or(from)
+                };
+                let path = folder.join(path);
+                Ok((Cow::Owned(Signals::read(&path)?), path))
+            }
+            Self::Memory(all) => Ok((Cow::Borrowed(memory::find(all, path)?), path.into())),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Files(from) => from,
+            Self::Memory(_) => Path::new(memory::FOLDER),
+        }
+    }
 }
 
 impl Survey {
@@ -96,8 +134,20 @@ impl Survey {
         };
         let settings = settings.with_file(folder)?;
         let paths = files(from, &settings)?;
-        let first = Signals::read(&folder.join(&paths[0].0))?;
-        let at = |why: String| RecordingError::at(from, why);
+        Self::look(Source::Files(from.to_owned()), &paths, settings, progress)
+    }
+
+    fn look(
+        source: Source,
+        paths: &[(String, Named)],
+        settings: Settings,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Self> {
+        let at = |why: String| RecordingError::at(source.path(), why);
+        let Some((path, _)) = paths.first() else {
+            return Err(at("there are no recordings".to_owned()));
+        };
+        let (first, _) = source.signals(path)?;
         let channel = match &settings.channel {
             Some(channel) => channel.clone(),
             None => liveliest(&first, &settings).map_err(at)?,
@@ -105,11 +155,11 @@ impl Survey {
         let how = How::new(&first, &settings).map_err(at)?;
         let done = std::sync::atomic::AtomicUsize::new(0);
         let looked = paths.par_iter().map(|(path, named)| {
-            let signals = Signals::read(&folder.join(path))?;
+            let (signals, place) = source.signals(path)?;
             let found = how.look(path, named, &signals, &channel, &settings);
             let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             progress(done, paths.len());
-            found.map_err(|why| RecordingError::at(&folder.join(path), why))
+            found.map_err(|why| RecordingError::at(&place, why))
         });
         let found: Vec<Vec<Found>> = looked.collect::<Result<_>>()?;
         let found: Vec<Found> = found.into_iter().flatten().collect();
@@ -123,7 +173,7 @@ impl Survey {
             kind: first.kind,
             pressure_gain: pressure,
             textures,
-            from: from.to_owned(),
+            source: source.clone(),
             settings,
         })
     }
@@ -151,24 +201,47 @@ impl Survey {
     /// the slides that were left out, and why: those of a dead sensor, copies. Errors: A file cannot be read again, or
     /// not be written.
     pub fn write(&self, to: &Path, progress: &dyn Fn(usize, usize)) -> Result<Vec<String>> {
-        let textures = (1..).zip(&self.textures).map(|(id, name)| Texture {
+        let command = format!("tactus import {} ...", self.source.path().display());
+        let mut writer = RecordingWriter::begin(to, self.texture_list(), &command)?;
+        let mut written = 0;
+        let left_out = self.each_slide(&mut |slide, labels| {
+            writer.label(labels);
+            writer.write(&slide)?;
+            written += 1;
+            progress(written, self.slides());
+            Ok(())
+        })?;
+        self.write_settings(to)?;
+        writer.finish()?;
+        Ok(left_out)
+    }
+
+    /// Writes the settings that say all that was found beside the recordings in a folder.
+    pub fn write_settings(&self, folder: &Path) -> Result<()> {
+        let path = folder.join(SETTINGS);
+        fs::write(&path, self.settings().template()).map_err(|why| RecordingError::at(&path, why))
+    }
+
+    fn texture_list(&self) -> Vec<Texture> {
+        let numbered = (1..).zip(&self.textures).map(|(id, name)| Texture {
             id,
             name: name.clone(),
         });
-        let command = format!("tactus import {} ...", self.from.display());
-        let mut writer = RecordingWriter::begin(to, textures.collect(), &command)?;
-        let folder = match self.from.is_dir() {
-            true => self.from.as_path(),
-            false => self.from.parent().unwrap_or(&self.from),
-        };
+        numbered.collect()
+    }
+
+    /// Gives away each slide with its labels. Returns the slides that were left out, and why.
+    fn each_slide(
+        &self,
+        take: &mut dyn FnMut(Recording, Labels) -> Result<()>,
+    ) -> Result<Vec<String>> {
         let mut numbers = vec![0_u32; self.textures.len()];
         let mut checks: Vec<SlideChecks> = numbers.iter().map(|_| SlideChecks::default()).collect();
         let mut left_out = Vec::new();
         // the parts of a file lie next to each other
         for parts in self.found.chunk_by(|a, b| a.path == b.path) {
-            let path = folder.join(&parts[0].path);
-            let signals = Signals::read(&path)?;
-            let at = |why: String| RecordingError::at(&path, why);
+            let (signals, place) = self.source.signals(&parts[0].path)?;
+            let at = |why: String| RecordingError::at(&place, why);
             let how = How::new(&signals, &self.settings).map_err(at)?;
             for found in parts {
                 let texture = self
@@ -176,7 +249,6 @@ impl Survey {
                     .iter()
                     .position(|t| *t == found.texture)
                     .unwrap_or(0);
-                writer.label(self.labels(found));
                 let pac = how.pac(&signals, &self.channel, found.rows.clone(), self.gain);
                 let slow = |column: &Option<String>, gain: Option<f64>| {
                     let both = column.as_ref().zip(gain);
@@ -198,14 +270,10 @@ impl Survey {
                         continue;
                     }
                     numbers[texture] += 1;
-                    writer.write(&slide)?;
-                    progress(numbers.iter().sum::<u32>() as usize, self.slides());
+                    take(slide, self.labels(found))?;
                 }
             }
         }
-        fs::write(to.join(SETTINGS), self.settings().template())
-            .map_err(|why| RecordingError::at(&to.join(SETTINGS), why))?;
-        writer.finish()?;
         Ok(left_out)
     }
 }
@@ -214,7 +282,10 @@ impl Survey {
     fn labels(&self, found: &Found) -> Labels {
         Labels {
             session: found.session.clone(),
-            run: found.path.clone(),
+            run: match &self.source {
+                Source::Files(_) => found.path.clone(),
+                Source::Memory(all) => memory::run(all, &found.path),
+            },
             finger: FingerCode::OTHER,
             sensor: self
                 .settings
@@ -317,7 +388,8 @@ fn textures(found: &[Found]) -> std::result::Result<Vec<String>, String> {
         .find(|texture| slides[texture.as_str()] == 0)
     {
         Some(texture) => Err(format!(
-            "no sliding was found in the files of {texture}; say where it is by --window FROM,TO, or move them away"
+            "no sliding was found in the recordings of {texture}; say where it is by --window FROM,TO (in Python by \
+             cut=False), or leave them out"
         )),
         None => Ok(textures),
     }

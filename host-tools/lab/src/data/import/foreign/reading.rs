@@ -246,7 +246,7 @@ fn span(values: &[f64]) -> f64 {
 }
 
 /// Fewest samples of a slide: spectra of some frames.
-const LEAST: usize = 1100;
+pub(super) const LEAST: usize = 1100;
 
 /// The file's column of time, in s.
 fn time(
