@@ -133,7 +133,6 @@ fn named(one: &InMemory) -> Named {
     Named {
         texture: one.texture.clone(),
         session: one.session.clone(),
-        ..Named::default()
     }
 }
 
