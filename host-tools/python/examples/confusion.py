@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One slide, one answer: the table's confusion matrix, and scikit-learn's classifiers on the same features.
+"""One slide, one answer: the table's confusion matrix. docs/peers.py compares it with scikit-learn's classifiers.
 
 usage: confusion.py RECORDINGS [TRAIN_SLIDES] [PICTURE]
 """
@@ -33,8 +33,7 @@ for truth, name in enumerate(names):
             explorer.restart()
             explorer.update(slide)
             confusion[truth, explorer.posterior.argmax()] += 1
-share = lambda right: f"{100 * right:.1f} % right after one slide"
-print(f"tactus, {len(names)} textures: {share(np.trace(confusion) / confusion.sum())}")
+print(f"{len(names)} textures: {100 * np.trace(confusion) / confusion.sum():.1f} % right after one slide")
 
 figure, axes = plt.subplots(figsize=(8, 7), layout="constrained")
 axes.imshow(confusion / confusion.sum(1, keepdims=True), cmap="viridis", vmin=0, vmax=1)
@@ -43,25 +42,3 @@ axes.set_yticks(range(len(names)), names)
 axes.set(xlabel="told", ylabel="presented")
 figure.savefig(picture, dpi=120)
 print(picture)
-
-try:
-    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-    from sklearn.ensemble import RandomForestClassifier
-    from sklearn.neighbors import KNeighborsClassifier
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-except ImportError:
-    sys.exit("without scikit-learn there is nothing to compare with: pip install scikit-learn")
-
-all_ = recordings.features()
-x = np.column_stack([all_["traction_n"], all_["ln_fused_bands"], all_["force_n"], all_["speed_mm_s"]])
-first = all_["trial"] <= train
-for classifier in (
-    make_pipeline(StandardScaler(), LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto")),
-    make_pipeline(StandardScaler(), KNeighborsClassifier(3)),
-    RandomForestClassifier(300, random_state=1),
-):
-    classifier.fit(x[first], all_["material"][first])
-    right = classifier.score(x[~first], all_["material"][~first])
-    last = getattr(classifier, "steps", [(None, classifier)])[-1][1]
-    print(f"{type(last).__name__}: {share(right)}")

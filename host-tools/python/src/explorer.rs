@@ -17,6 +17,7 @@ use tactus_lab::eval::verify;
 use crate::arguments;
 use crate::error::Raise as _;
 use crate::features::{Features, movement};
+use crate::rows;
 use crate::table::Table;
 use crate::values::{array, no_pickle, object};
 
@@ -177,22 +178,26 @@ impl Explorer {
         object(py, &all.collect::<Vec<_>>())
     }
 
-    /// Takes in what a slide measured. property: which one is looked at, for methods that look at one; that of the last
-    /// `next_movement`, unless given.
+    /// Takes in what a slide measured: its `Features`, or its row of features where the table was learned from such.
+    /// property: which one is looked at, for methods that look at one; that of the last `next_movement`, unless given.
     ///
     /// Raises ValueError where the table does not have the slide's movement, TableError where the slide lacks what is
     /// compared.
     #[pyo3(signature = (slide, property=None))]
-    fn update(&self, slide: &Features, property: Option<&str>) -> PyResult<()> {
+    fn update(&self, slide: &Bound<'_, PyAny>, property: Option<&str>) -> PyResult<()> {
+        let (movement, observation) = match slide.cast::<Features>() {
+            Ok(slide) => (slide.get().movement, slide.get().observation()),
+            Err(_) => (rows::MOVEMENT, rows::one(slide)?),
+        };
         let mut inner = self.inner();
-        let movement = inner.place(slide.movement)?;
+        let movement = inner.place(movement)?;
         let chosen = inner.chosen.filter(|chosen| chosen.movement == movement);
         let property = match property {
             Some(name) => Some(self::property(name)?),
             None => chosen.and_then(|chosen| chosen.property),
         };
         let action = Action { movement, property };
-        let taken = inner.core.observe(action, &slide.observation());
+        let taken = inner.core.observe(action, &observation);
         taken.map_err(|why| why.raise())?;
         inner.chosen = None;
         Ok(())

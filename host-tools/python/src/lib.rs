@@ -3,12 +3,14 @@
 //! `tactus/__init__.pyi`.
 
 mod arguments;
+mod arrays;
 mod error;
 mod evaluate;
 mod explorer;
 mod features;
 mod probe;
 mod recordings;
+mod rows;
 mod samples;
 mod simulate;
 mod table;
@@ -24,6 +26,7 @@ fn _tactus(module: &Bound<'_, PyModule>) -> PyResult<()> {
     features::add(module)?;
     recordings::add(module)?;
     table::add(module)?;
+    rows::add(module)?;
     evaluate::add(module)?;
     explorer::add(module)?;
     simulate::add(module)?;

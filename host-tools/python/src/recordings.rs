@@ -4,27 +4,34 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use numpy::PyArray1;
+use pyo3::IntoPyObjectExt as _;
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
+use tactus_lab::data::import::copy;
+use tactus_lab::data::import::settings::{SETTINGS, Settings};
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
-use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::recordings::{Held, RecordingSet};
 use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all, trials};
 
+use crate::arrays::{self, Columns, Found};
 use crate::error::Raise as _;
 use crate::features::{Features, plan};
-use crate::values::{Pickled, array, pickled, rows, unpickled};
+use crate::values::{Pickled, array, object, pickled, rows, unpickled};
 use crate::work::{work, work_on_all_cores};
 
-/// A folder of recorded slides, in the project's own format or that of BioTac_slide_20_50; `len()` counts its slides.
+/// Recorded slides: a folder in the project's own format or that of BioTac_slide_20_50, or arrays (`from_arrays`);
+/// `len()` counts the slides.
 ///
-/// Opening reads the manifest only. Raises RecordingError where there is none, or it makes no sense.
+/// Opening a folder reads the manifest only. Raises RecordingError where there is none, or it makes no sense.
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Recordings {
     pub(crate) set: Arc<RecordingSet>,
     measured: OnceLock<Arc<Measured>>,
+    /// of arrays
+    found: Option<Arc<Found>>,
 }
 
 /// What the slides of each texture measure.
@@ -55,6 +62,14 @@ pub(crate) enum Wanted {
 }
 
 impl Recordings {
+    fn of(set: RecordingSet, found: Option<Found>) -> Self {
+        Self {
+            set: Arc::new(set),
+            measured: OnceLock::new(),
+            found: found.map(Arc::new),
+        }
+    }
+
     /// What all slides measure, per texture and in the order of time. They are read and measured once.
     pub(crate) fn measured(&self, py: Python<'_>) -> PyResult<Arc<Measured>> {
         if let Some(measured) = self.measured.get() {
@@ -70,6 +85,18 @@ impl Recordings {
         })?;
         // who was first is as good
         Ok(Arc::clone(self.measured.get_or_init(|| Arc::new(all))))
+    }
+
+    /// Adds the session and the run of each slide.
+    fn labels(&self, columns: &Bound<'_, PyDict>) -> PyResult<()> {
+        let textures = 0..self.set.textures().len();
+        let keys = textures.flat_map(|index| self.set.slides(index));
+        let (sessions, runs): (Vec<&str>, Vec<&str>) = keys
+            .map(|key| (key.labels.session.as_str(), key.labels.run.as_str()))
+            .unzip();
+        let numpy = columns.py().import("numpy")?;
+        columns.set_item("session", numpy.call_method1("array", (sessions, "str"))?)?;
+        columns.set_item("run", numpy.call_method1("array", (runs, "str"))?)
     }
 
     fn find(&self, wanted: &Wanted) -> PyResult<usize> {
@@ -96,22 +123,121 @@ impl Recordings {
     #[new]
     fn new(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
         let set = work(py, move |_| RecordingSet::open(&folder))?;
-        Ok(Self {
-            set: Arc::new(set),
-            measured: OnceLock::new(),
+        Ok(Self::of(set, None))
+    }
+
+    /// Recordings from arrays of any sensor, by the import of `tactus import`.
+    ///
+    /// arrays: one recording each, of any real type: of shape (samples,), or (samples, channels). labels: the name of
+    /// each one's texture. rate_hz: samples per second, 100 Hz to 192 kHz (slower ones from 1 Hz, too). From 500 Hz on
+    /// they are resampled to 2200 Hz, band-limited; a slower clock is taken for one of 2200 Hz.
+    ///
+    /// cut: where the finger slides is found by energy, and long sliding is divided (True), or each array is one slide
+    /// as a whole (False). length_s: the length of slides into which longer sliding is divided. A slide has 1100
+    /// samples at least, at 2200 Hz or of the slower clock.
+    ///
+    /// unit: of the samples, such as "g", "m/s2" or "V"; those in "counts" stay as they are. gain: counts per unit;
+    /// what fills 12 bits without clipping is found, unless given, and told by `gain`: give it again for slides that are to
+    /// be compared with these. channel, pressure, shear: numbers of the channels, from 0, of the vibration (the
+    /// liveliest, unless given), of the contact's pressure (P_DC) and of the tangential force in N (neither, unless
+    /// given). sessions, runs: one for each array, where they are known; without runs each array is one. finger: name
+    /// of the sensor. force_n, speed_mm_s: the movement, if it is known.
+    ///
+    /// Slides of a sensor that hangs or is cut off, copies and short ones are left out with a warning. Raises
+    /// RecordingError where the arrays give no slides; TypeError and ValueError for what are no real numbers, no numbers that were measured,
+    /// or for labels that do not fit.
+    #[staticmethod]
+    #[pyo3(signature = (arrays, *, rate_hz, labels, unit=None, sessions=None, runs=None, gain=None, channel=None,
+        pressure=None, shear=None, finger=None, force_n=None, speed_mm_s=None, length_s=None, cut=true))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all but the first have names where it is called"
+    )]
+    fn from_arrays(
+        arrays: &Bound<'_, PyAny>,
+        rate_hz: f64,
+        labels: &Bound<'_, PyAny>,
+        unit: Option<String>,
+        sessions: Option<&Bound<'_, PyAny>>,
+        runs: Option<&Bound<'_, PyAny>>,
+        gain: Option<f64>,
+        channel: Option<usize>,
+        pressure: Option<usize>,
+        shear: Option<usize>,
+        finger: Option<String>,
+        force_n: Option<f32>,
+        speed_mm_s: Option<f32>,
+        length_s: Option<f64>,
+        cut: bool,
+    ) -> PyResult<Self> {
+        let settings = Settings {
+            rate: Some(rate_hz),
+            channel: arrays::channel(channel),
+            unit,
+            gain,
+            pressure: arrays::channel(pressure),
+            shear: arrays::channel(shear),
+            finger,
+            force: force_n,
+            speed: speed_mm_s,
+            window: (!cut).then(|| "0,1e9".to_owned()),
+            length: length_s,
+            ..Settings::default()
+        };
+        let columns = Columns {
+            labels,
+            sessions,
+            runs,
+        };
+        let (set, found) = arrays::read(arrays, &columns, settings)?;
+        Ok(Self::of(set, Some(found)))
+    }
+
+    /// Writes all slides in the project's own format into a folder that is not there yet: `Recordings` and the command
+    /// read it. An interrupted one goes on.
+    ///
+    /// Raises RecordingError where the folder holds recordings already, or cannot be written; KeyboardInterrupt after
+    /// Ctrl-C.
+    fn write(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        let (set, found) = (Arc::clone(&self.set), self.found.clone());
+        work(py, move |between| {
+            let written = copy(&set, &folder, &mut |_, _| between());
+            written.map_err(|why| why.raise())?;
+            match found {
+                Some(found) => std::fs::write(folder.join(SETTINGS), found.settings.template()),
+                None => Ok(()),
+            }
+            .map_err(PyErr::from)
         })
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (PathBuf,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        if let (Some(held), Some(found)) = (self.set.held(), &self.found) {
+            return pickled(py, "_recordings", &(held, &**found))?.into_bound_py_any(py);
+        }
         // another process may be in another folder
         let folder = std::path::absolute(self.set.folder())?;
-        Ok((py.get_type::<Self>().into_any(), (folder,)))
+        (py.get_type::<Self>(), (folder,)).into_bound_py_any(py)
     }
 
-    /// The folder.
+    /// The folder; None where they are arrays.
     #[getter]
-    fn folder(&self) -> PathBuf {
-        self.set.folder().to_owned()
+    fn folder(&self) -> Option<PathBuf> {
+        self.found.is_none().then(|| self.set.folder().to_owned())
+    }
+
+    /// Counts per unit of the arrays that they were made from; None where they are a folder.
+    #[getter]
+    fn gain(&self) -> Option<f64> {
+        self.found.as_ref().map(|found| found.gain)
+    }
+
+    /// What `from_arrays` found, as a dict: rate_hz, unit, gain (counts per unit), channel (None where there is one),
+    /// left_out (slides, and why), settings. None where they are a folder.
+    #[getter]
+    fn found<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let found = self.found.as_ref();
+        found.map(|found| object(py, &**found)).transpose()
     }
 
     /// Names of the textures, in the order of the manifest.
@@ -170,8 +296,9 @@ impl Recordings {
     ///
     /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it cannot be measured),
     /// roughness_ln, fineness_unfiltered_ln (float32), roughness_is_bound (bool), each of shape (slides,); ln_psd_bands
-    /// of shape (slides, 8) and ln_fused_bands of shape (slides, 12), float32. See `Features` for units. Slides are
-    /// read and measured once, on all cores.
+    /// of shape (slides, 8) and ln_fused_bands of shape (slides, 12), float32; pdc of shape (slides, 2), mean and
+    /// standard deviation of P_DC, NaN where it was not measured; session and run (str). See `Features` for units.
+    /// Slides are read and measured once, on all cores.
     ///
     /// Raises RecordingError where a file cannot be read, or a slide has no features; KeyboardInterrupt after Ctrl-C.
     fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -217,6 +344,12 @@ impl Recordings {
         ] {
             columns.set_item(name, array(py, values))?;
         }
+        let pdc = all.iter().flat_map(|s| {
+            let (mean, sd) = s.measurement.pdc.unwrap_or((f32::NAN, f32::NAN));
+            [mean, sd]
+        });
+        columns.set_item("pdc", rows(py, pdc.collect(), 2)?)?;
+        self.labels(&columns)?;
         columns.set_item("ln_psd_bands", rows(py, bands, BAND_EDGES.len() - 1)?)?;
         columns.set_item("ln_fused_bands", rows(py, fused.collect(), FUSED_BANDS)?)?;
         Ok(columns)
@@ -230,9 +363,14 @@ impl Recordings {
     fn __repr__(&self) -> String {
         let folder = self.set.folder().display();
         let textures = self.set.textures().len();
+        let told = self.found.as_ref().map(|found| {
+            let unit = found.unit.as_deref().unwrap_or("unit");
+            format!(", {} counts per {unit}", found.gain)
+        });
         format!(
-            "<tactus.Recordings {folder}: {textures} textures, {} slides>",
-            self.__len__()
+            "<tactus.Recordings {folder}: {textures} textures, {} slides{}>",
+            self.__len__(),
+            told.unwrap_or_default()
         )
     }
 }
@@ -360,6 +498,14 @@ fn features_in(recording: &Recording) -> Result<Features, SlideError> {
     })
 }
 
+/// The `Recordings` that were pickled.
+#[pyfunction]
+fn _recordings(saved: &str) -> PyResult<Recordings> {
+    let (held, found): (Held, Found) = unpickled("recordings", saved)?;
+    let set = RecordingSet::in_memory("arrays".as_ref(), held);
+    Ok(Recordings::of(set, Some(found)))
+}
+
 /// The `Slide` that was pickled.
 #[pyfunction]
 fn _slide(saved: &str) -> PyResult<Slide> {
@@ -371,5 +517,6 @@ pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Recordings>()?;
     module.add_class::<Slide>()?;
     module.add_function(wrap_pyfunction!(_slide, module)?)?;
+    module.add_function(wrap_pyfunction!(_recordings, module)?)?;
     module.add_function(wrap_pyfunction!(features_of, module)?)
 }

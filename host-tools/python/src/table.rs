@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use tactus_core::explorer;
 use tactus_core::features::Movement;
+use tactus_core::sensor::FingerCode;
 use tactus_core::table::{FALSE_ALARM, Table as Read};
 use tactus_lab::data::recordings::files::open;
 use tactus_lab::data::table_file::{TableFileError, read_table};
@@ -20,6 +21,7 @@ use crate::arguments;
 use crate::error::Raise as _;
 use crate::features::Features;
 use crate::recordings::Recordings;
+use crate::rows;
 use crate::values::object;
 use crate::work::{work, work_on_all_cores};
 
@@ -56,19 +58,27 @@ fn expected(drift: (f32, f32), false_alarm: Option<f32>) -> PyResult<Expected> {
 impl Table {
     /// Learns a table from the first slides of every texture and movement, as `tactus learn` does, byte for byte.
     ///
-    /// train_slides: so many of each, or as many as there are, two at least. method: what the table is for. features:
-    /// of a fused table, "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
-    /// drift: standard deviations of band powers (ln) and of traction (share) that it expects from session to session.
-    /// false_alarm: share of known textures that may be taken for new ones, 0.0005 to 0.2.
+    /// recordings: `Recordings`; or features of one's own, of shape (slides, features), 1 to `MAX_FEATURES` of them,
+    /// within -31.9 to 31.9, with a label for each slide. train_slides: so many of each, or as many as there are, two
+    /// at least; 5, and of features of one's own all, unless given. method: what the table is for. features: of a fused
+    /// table, "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
+    /// drift: standard deviations of band powers (ln) and of traction (share) that it expects from session to session;
+    /// of features of one's own, in their unit. false_alarm: share of known textures that may be taken for new ones,
+    /// 0.0005 to 0.2.
     ///
     /// Raises TableError where the slides make no table, RecordingError where they cannot be read.
     #[staticmethod]
-    #[pyo3(signature = (recordings, *, train_slides=5, method="fused", features=None, drift=(0.1, 0.04),
-        false_alarm=None))]
+    #[pyo3(signature = (recordings, labels=None, *, train_slides=None, method="fused", features=None,
+        drift=(0.1, 0.04), false_alarm=None))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all but the first two have names where it is called"
+    )]
     fn learn(
         py: Python<'_>,
-        recordings: &Recordings,
-        train_slides: usize,
+        recordings: &Bound<'_, PyAny>,
+        labels: Option<&Bound<'_, PyAny>>,
+        train_slides: Option<usize>,
         method: &str,
         features: Option<&str>,
         drift: (f32, f32),
@@ -77,6 +87,24 @@ impl Table {
         let method = arguments::method(method)?;
         let features = arguments::features(features)?;
         let expected = expected(drift, false_alarm)?;
+        let Ok(recordings) = recordings.cast::<Recordings>() else {
+            let most = train_slides.unwrap_or(usize::MAX);
+            let (names, rows) = rows::labelled(recordings, labels, most)?;
+            let observed: Vec<_> = rows.into_iter().map(|rows| vec![rows]).collect();
+            return Self::of(work_on_all_cores(py, move |_| {
+                let movements = [rows::MOVEMENT];
+                learn_for(
+                    &expected,
+                    method.method(),
+                    features,
+                    &names,
+                    &movements,
+                    &observed,
+                )
+            })?);
+        };
+        let recordings = recordings.get();
+        let train_slides = train_slides.unwrap_or(5);
         let (set, measured) = (Arc::clone(&recordings.set), recordings.measured(py)?);
         Self::of(work_on_all_cores(py, move |_| {
             learn_first(&set, &measured, train_slides, method, features, &expected)
@@ -179,10 +207,14 @@ impl Table {
         Ok(arguments::method_name(Method::of(best)))
     }
 
-    /// The finger that the table was learned with.
+    /// The finger that the table was learned with; the name of a sensor of one's own.
     #[getter]
     fn finger(&self) -> PyResult<String> {
-        Ok(self.read()?.finger().to_string())
+        let table = self.read()?;
+        Ok(match table.finger() {
+            FingerCode::OTHER => table.sensor().to_owned(),
+            finger => finger.to_string(),
+        })
     }
 
     /// CRC-32 of the table, eight hexadecimal digits.

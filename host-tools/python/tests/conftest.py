@@ -31,6 +31,22 @@ def pytest_runtest_logreport(report):
             file.write(f"python {report.nodeid}: {report.longrepr[-1]}\n")
 
 
+def sklearn():
+    """Skips the test without scikit-learn; fails it where that must be."""
+    try:
+        tactus.TactusClassifier  # noqa: B018
+    except ImportError as why:
+        lacking(str(why), os.environ.get("TACTUS_REQUIRE_SKLEARN") == "1")
+
+
+def received(line):
+    """The next bytes of a line; none at its end, which a host that closes it with bytes unread makes a reset."""
+    try:
+        return line.recv(4096)
+    except ConnectionResetError:
+        return b""
+
+
 def data(name):
     """A folder of recordings that the repository does not have."""
     folder = pathlib.Path(os.environ.get("TACTUS_DATA", ROOT.parent / "shared/data")) / name

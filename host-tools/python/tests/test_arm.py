@@ -8,7 +8,7 @@ import threading
 import time
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, received
 
 import tactus
 
@@ -35,7 +35,7 @@ class Probe:
     def serve(self):
         self.line, _ = self.listener.accept()
         rest = b""
-        while came := self.line.recv(4096):
+        while came := received(self.line):
             *frames, rest = (rest + came).split(b"\0")
             for request in map(client.message, filter(None, frames)):
                 request = client.read("Request", request)[0]

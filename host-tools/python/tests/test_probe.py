@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, received
 
 import tactus
 
@@ -40,7 +40,7 @@ class Probe:
         while True:
             line, _ = self.listener.accept()
             rest = b""
-            while line.fileno() >= 0 and (came := line.recv(4096)):
+            while line.fileno() >= 0 and (came := received(line)):
                 *frames, rest = (rest + came).split(b"\0")
                 for request in map(client.message, filter(None, frames)):
                     request = client.read("Request", request)[0]

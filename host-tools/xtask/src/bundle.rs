@@ -43,7 +43,7 @@ struct Product {
     build: fn() -> Result<(String, PathBuf)>,
 }
 
-const PRODUCTS: [Product; 3] = [
+const PRODUCTS: [Product; 4] = [
     Product {
         name: "command",
         made_of: ("Cargo.toml", "tactus-probe", None),
@@ -54,11 +54,17 @@ const PRODUCTS: [Product; 3] = [
         name: "wheel",
         made_of: ("host-tools/python/Cargo.toml", "tactus-python", None),
         lacks: python::can_build,
-        build: || {
-            let wheel = python::wheel()?;
-            let name = wheel.file_name().unwrap_or_default();
-            Ok((name.to_string_lossy().into_owned(), wheel))
-        },
+        build: || named(python::wheel()?),
+    },
+    Product {
+        name: "wheel for 64-bit ARM",
+        made_of: (
+            "host-tools/python/Cargo.toml",
+            "tactus-python",
+            Some(python::ARM),
+        ),
+        lacks: python::can_cross,
+        build: || named(python::cross_wheel()?),
     },
     Product {
         name: "page",
@@ -77,6 +83,11 @@ const FIRMWARE: (&str, &str, Option<&str>) = (
     "tactus-firmware",
     Some(toolchain::CHIP.triple),
 );
+
+fn named(file: PathBuf) -> Result<(String, PathBuf)> {
+    let name = file.file_name().unwrap_or_default();
+    Ok((name.to_string_lossy().into_owned(), file))
+}
 
 fn command() -> Result<(String, PathBuf)> {
     let folder = target().join("command");

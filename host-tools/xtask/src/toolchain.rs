@@ -267,11 +267,13 @@ fn apt_get(target: Target, arguments: &[&str]) -> Result<()> {
 }
 
 fn active_has(target: Target) -> bool {
-    stdout(
-        "rustc",
-        &["--print", "target-libdir", "--target", target.triple],
-    )
-    .is_some_and(|folder| Path::new(&folder).is_dir())
+    has_library(target.triple)
+}
+
+/// Returns true if the active toolchain has the standard library of a target.
+pub(crate) fn has_library(triple: &str) -> bool {
+    stdout("rustc", &["--print", "target-libdir", "--target", triple])
+        .is_some_and(|folder| Path::new(&folder).is_dir())
 }
 
 fn stdout(program: &str, arguments: &[&str]) -> Option<String> {

@@ -148,7 +148,13 @@ pub fn import(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
     import_csv(from, to, progress)
 }
 
-fn copy(set: &RecordingSet, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
+/// Writes recordings in the project's own format into the folder `to`, as [`import`] does.
+/// Errors: as of [`import`].
+pub fn copy(
+    set: &RecordingSet,
+    to: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Imported> {
     let mut done = Imported {
         textures: set.textures().len(),
         ..Imported::default()

@@ -1,6 +1,6 @@
 //! One recorded slide: the movement that made it, its blocks of samples, and what no block has.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::ops::Range;
 use tactus_core::features::{Block, Movement, Slide};
@@ -22,6 +22,7 @@ pub struct Recording {
     /// Number of the slide; slides of a texture were made in the order of their numbers.
     pub number: u32,
     /// The movement that made it.
+    #[serde(deserialize_with = "any_movement")]
     pub movement: Movement,
     /// Start and end of the part at constant speed, in seconds from the start of the record.
     pub window: (f32, f32),
@@ -45,8 +46,14 @@ pub struct Recording {
     pub highest_hz: Option<f32>,
 }
 
+/// A movement that may be unknown.
+fn any_movement<'de, D: Deserializer<'de>>(from: D) -> Result<Movement, D::Error> {
+    let (force_mn, speed_um_s) = Deserialize::deserialize(from)?;
+    Movement::stored(force_mn, speed_um_s).map_err(serde::de::Error::custom)
+}
+
 /// One texture of a set.
-#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 pub struct Texture {
     /// The number that the recordings give it.
     pub id: u32,
@@ -66,7 +73,7 @@ pub struct SlideKey {
 }
 
 /// Labels of a slide for quality control besides its texture; empty if unknown.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Labels {
     /// Batch or piece that the sample was taken from.
     pub lot: String,

@@ -83,13 +83,51 @@ pub struct RecordingSet {
     source: Source,
 }
 
+/// Textures, each with its slides in the order of time.
+pub type Held = Vec<(Texture, Vec<(Recording, Labels)>)>;
+
 #[derive(Debug)]
 enum Source {
     Own(own::Manifest),
     Biotac(biotac::Manifest),
+    Memory(Vec<Vec<Recording>>),
 }
 
 impl RecordingSet {
+    /// Recordings in memory; `name` stands for their folder.
+    pub fn in_memory(name: &Path, all: Held) -> Self {
+        let (mut textures, mut keys, mut recordings) = (Vec::new(), Vec::new(), Vec::new());
+        for (texture, slides) in all {
+            let key = |(slide, labels): &(Recording, Labels)| SlideKey {
+                number: slide.number,
+                movement: slide.movement,
+                labels: labels.clone(),
+            };
+            textures.push(texture);
+            keys.push(slides.iter().map(key).collect());
+            recordings.push(slides.into_iter().map(|(slide, _)| slide).collect());
+        }
+        Self {
+            folder: name.to_owned(),
+            textures,
+            slides: keys,
+            source: Source::Memory(recordings),
+        }
+    }
+
+    /// All that recordings in memory hold; `None` where they lie in a folder.
+    pub fn held(&self) -> Option<Held> {
+        let Source::Memory(recordings) = &self.source else {
+            return None;
+        };
+        let labelled = |(slides, keys): (&Vec<Recording>, &Vec<SlideKey>)| {
+            let labels = keys.iter().map(|key| key.labels.clone());
+            slides.iter().cloned().zip(labels).collect()
+        };
+        let all = recordings.iter().zip(&self.slides).map(labelled);
+        Some(self.textures.iter().cloned().zip(all).collect())
+    }
+
     /// Opens the recordings of `folder`: reads the manifest, not yet the samples. A `manifest.csv` goes before a
     /// `manifest.json`.
     /// Errors: if there is no such folder or manifest, or the manifest makes no sense.
@@ -201,6 +239,12 @@ impl RecordingSet {
         match &self.source {
             Source::Own(manifest) => manifest.each_slide(&self.folder, index, take),
             Source::Biotac(manifest) => manifest.each_slide(&self.folder, index, take),
+            Source::Memory(all) => all
+                .get(index)
+                .into_iter()
+                .flatten()
+                .cloned()
+                .try_for_each(take),
         }
     }
 
@@ -210,6 +254,12 @@ impl RecordingSet {
             // its files as they are, as samples and as blocks
             Source::Own(_) => 16 * npy::MAX_BYTES,
             Source::Biotac(manifest) => manifest.memory(index),
+            Source::Memory(all) => all
+                .get(index)
+                .into_iter()
+                .flatten()
+                .map(Recording::bytes)
+                .sum(),
         }
     }
 }

@@ -3,10 +3,12 @@
 Recordings become features, features a table, and a table explores. All arrays that come out are read-only numpy arrays. What goes
 wrong is a `TactusError` with the sentence of the command line. Long work releases the interpreter's lock, and Ctrl-C ends it.
 It works in processes that were forked, too; `Recordings`, `Slide`, `Features` and `Table` can be pickled.
+`TactusClassifier` needs scikit-learn.
 """
 
 from . import _tactus
 from ._tactus import (
+    MAX_FEATURES,
     TEXTURES,
     Events,
     Explorer,
@@ -34,6 +36,7 @@ __all__ = [
     "Events",
     "Explorer",
     "Features",
+    "MAX_FEATURES",
     "Probe",
     "ProbeError",
     "RecordingError",
@@ -52,6 +55,7 @@ __all__ = [
     "evaluate",
     "features",
     "features_of",
+    "identify",
     "read_log",
     "simulate",
     "verify",
@@ -78,6 +82,15 @@ def _arguments(given):
     return {**_DEFAULTS, **given}
 
 
+def __getattr__(name):
+    # scikit-learn takes a second to import, and need not be there
+    if name == "TactusClassifier":
+        from .estimator import TactusClassifier
+
+        return TactusClassifier
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 def evaluate(recordings, **arguments):
     """Play virtual explorations and count the right answers, as `tactus evaluate` does.
 
@@ -97,6 +110,26 @@ def evaluate(recordings, **arguments):
     Raises TactusError where the slides do not suffice, ValueError for an argument, KeyboardInterrupt after Ctrl-C.
     """
     return _tactus.evaluate(recordings, _arguments(arguments))
+
+
+def identify(table, slides, **arguments):
+    """Say which texture of a table slides are of, slide by slide until it is sure, as `tactus identify` does.
+
+    table: a `Table`. slides: `Features` of one texture, or rows of features where the table was learned from such, in
+    the order of time; those of movements that the table does not have are passed over. arguments: method, threshold,
+    max_slides, open and false_alarm, as of `Explorer`.
+
+    Returns a dict as of `Explorer.best`: told ("sure", "changed", "new" or "undecided"), texture, probability, slides.
+    Raises TableError where a slide lacks what is compared.
+    """
+    explorer, settings = Explorer(table, **arguments), set(table.settings)
+    for slide in slides:
+        if isinstance(slide, Features) and (slide.force_n, slide.speed_mm_s) not in settings:
+            continue
+        explorer.update(slide)
+        if explorer.verdict():
+            break
+    return explorer.best()
 
 
 def verify(table, texture, slides, **arguments):

@@ -6,8 +6,14 @@ from numpy.typing import NDArray
 
 # counts that 16 bits hold
 _Samples = Union[NDArray[np.integer[Any]], Sequence[int]]
+# real numbers of any type
+_Signal = Union[NDArray[Any], Sequence[float], Sequence[Sequence[float]]]
+# features of one's own, and what they are of
+_Rows = Union[NDArray[Any], Sequence[Sequence[float]]]
+_Labels = Union[NDArray[Any], Sequence[Any]]
 
 __version__: str
+MAX_FEATURES: int
 TEXTURES: List[str]
 
 class TactusError(Exception):
@@ -104,11 +110,35 @@ class Slide:
 def features_of(slides: Sequence[Slide]) -> List[Features]: ...
 
 class Recordings:
-    """A folder of recorded slides."""
+    """Recorded slides of a folder, or of arrays."""
 
     def __init__(self, folder: Union[str, PathLike[str]]) -> None: ...
+    @staticmethod
+    def from_arrays(
+        arrays: Iterable[_Signal],
+        *,
+        rate_hz: float,
+        labels: _Labels,
+        unit: Optional[str] = None,
+        sessions: Optional[_Labels] = None,
+        runs: Optional[_Labels] = None,
+        gain: Optional[float] = None,
+        channel: Optional[int] = None,
+        pressure: Optional[int] = None,
+        shear: Optional[int] = None,
+        finger: Optional[str] = None,
+        force_n: Optional[float] = None,
+        speed_mm_s: Optional[float] = None,
+        length_s: Optional[float] = None,
+        cut: bool = True,
+    ) -> Recordings: ...
+    def write(self, folder: Union[str, PathLike[str]]) -> None: ...
     @property
-    def folder(self) -> PathLike[str]: ...
+    def folder(self) -> Optional[PathLike[str]]: ...
+    @property
+    def gain(self) -> Optional[float]: ...
+    @property
+    def found(self) -> Optional[Dict[str, Any]]: ...
     @property
     def textures(self) -> List[str]: ...
     @property
@@ -127,9 +157,10 @@ class Table:
 
     @staticmethod
     def learn(
-        recordings: Recordings,
+        recordings: Union[Recordings, _Rows],
+        labels: Optional[_Labels] = None,
         *,
-        train_slides: int = 5,
+        train_slides: Optional[int] = None,
         method: str = "fused",
         features: Optional[str] = None,
         drift: Tuple[float, float] = (0.1, 0.04),
@@ -197,7 +228,9 @@ class Explorer:
     def restart(self) -> None: ...
     def next_movement(self) -> Dict[str, Any]: ...
     def expected(self) -> List[Dict[str, Any]]: ...
-    def update(self, slide: Features, property: Optional[str] = None) -> None: ...
+    def update(
+        self, slide: Union[Features, NDArray[Any], Sequence[float]], property: Optional[str] = None
+    ) -> None: ...
     def reject(self, force_n: float, speed_mm_s: float) -> bool: ...
     @property
     def posterior(self) -> NDArray[np.float32]: ...
@@ -210,6 +243,16 @@ class Explorer:
     def verification(self) -> Optional[Dict[str, Any]]: ...
     def false_accept(self) -> Optional[float]: ...
 
+def identify(
+    table: Table,
+    slides: Iterable[Union[Features, NDArray[Any], Sequence[float]]],
+    *,
+    method: Optional[str] = None,
+    threshold: float = 0.99,
+    max_slides: int = 10,
+    open: bool = True,
+    false_alarm: Optional[float] = None,
+) -> Dict[str, Any]: ...
 def verify(
     table: Table,
     texture: str,
@@ -297,3 +340,17 @@ class Rig:
     def drive(self, probe: Probe, events: Events) -> Iterator[Dict[str, Any]]: ...
 
 def read_log(path: Union[str, PathLike[str]]) -> List[Dict[str, Any]]: ...
+
+class TactusClassifier:
+    """A fused table as a classifier of scikit-learn, which must be installed."""
+
+    classes_: NDArray[Any]
+    n_features_in_: int
+    table_: Table
+    def __init__(self, *, drift: float = 0.0) -> None: ...
+    def fit(self, X: _Rows, y: _Labels) -> TactusClassifier: ...
+    def predict(self, X: _Rows) -> NDArray[Any]: ...
+    def predict_proba(self, X: _Rows) -> NDArray[np.float64]: ...
+    def score(self, X: _Rows, y: _Labels, sample_weight: Optional[_Labels] = None) -> float: ...
+    def get_params(self, deep: bool = True) -> Dict[str, Any]: ...
+    def set_params(self, **params: Any) -> TactusClassifier: ...

@@ -1,25 +1,29 @@
 //! Anybody's files as recordings: looked at once, to find what they do not say, and written in the project's format.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
 
 use super::cut::Parts;
 use super::resample::RATES_HZ;
-use super::settings::{SETTINGS, Settings};
+use super::settings::{Named, SETTINGS, Settings};
 use super::signals::Signals;
 use crate::data::quality::SlideChecks;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
 
+mod memory;
 mod paths;
 mod reading;
 
+pub use memory::InMemory;
 use paths::files;
 use reading::{How, liveliest, rounded};
 
@@ -78,8 +82,53 @@ pub struct Survey {
     pub textures: Vec<String>,
     /// Counts of P_DC per unit of its column; `None` where there is none, or it never changes.
     pub pressure_gain: Option<f64>,
-    from: PathBuf,
+    source: Source,
     settings: Settings,
+}
+
+/// The place of the signals.
+#[derive(Clone, Debug)]
+enum Source {
+    /// Files below a folder, or one file.
+    Files(PathBuf),
+    /// Memory: a path is the number of a signal.
+    Memory(Arc<[InMemory]>),
+}
+
+impl Source {
+    /// The signals of a path, and its name in errors.
+    fn signals(&self, path: &str) -> Result<(Cow<'_, Signals>, PathBuf)> {
+        match self {
+            Self::Files(_) => {
+                let path = self.folder().join(path);
+                Ok((Cow::Owned(Signals::read(&path)?), path))
+            }
+            Self::Memory(all) => Ok((Cow::Borrowed(memory::find(all, path)?), path.into())),
+        }
+    }
+
+    /// Bytes that the signals of a path take, about.
+    fn memory(&self, path: &str) -> u64 {
+        match self {
+            Self::Files(_) => Signals::memory(&self.folder().join(path)),
+            Self::Memory(_) => 0,
+        }
+    }
+
+    fn folder(&self) -> &Path {
+        let path = self.path();
+        match path.is_dir() {
+            true => path,
+            false => path.parent().unwrap_or(path),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Files(from) => from,
+            Self::Memory(_) => Path::new(memory::FOLDER),
+        }
+    }
 }
 
 impl Survey {
@@ -100,20 +149,33 @@ impl Survey {
         let at = |why: String| RecordingError::at(from, why);
         settings.check().map_err(at)?;
         let paths = files(from, &settings)?;
-        let first = Signals::read(&folder.join(&paths[0].0))?;
+        Self::look(Source::Files(from.to_owned()), &paths, settings, progress)
+    }
+
+    fn look(
+        source: Source,
+        paths: &[(String, Named)],
+        settings: Settings,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Self> {
+        let at = |why: String| RecordingError::at(source.path(), why);
+        let Some((path, _)) = paths.first() else {
+            return Err(at("there are no recordings".to_owned()));
+        };
+        let (first, _) = source.signals(path)?;
         let channel = match &settings.channel {
             Some(channel) => channel.clone(),
             None => liveliest(&first, &settings).map_err(at)?,
         };
         let how = How::new(&first, &settings).map_err(at)?;
         let done = std::sync::atomic::AtomicUsize::new(0);
-        let memory = |(path, _): &(String, _)| Signals::memory(&folder.join(path));
-        let found = each_in_flight(&paths, memory, |(path, named)| {
-            let signals = Signals::read(&folder.join(path))?;
+        let memory = |(path, _): &(String, _)| source.memory(path);
+        let found = each_in_flight(paths, memory, |(path, named)| {
+            let (signals, place) = source.signals(path)?;
             let found = how.look(path, named, &signals, &channel, &settings);
             let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             progress(done, paths.len());
-            found.map_err(|why| RecordingError::at(&folder.join(path), why))
+            found.map_err(|why| RecordingError::at(&place, why))
         })?;
         let found: Vec<Found> = found.into_iter().flatten().collect();
         let (gain, pressure) = gains(&found, &channel, &settings).map_err(at)?;
@@ -126,7 +188,7 @@ impl Survey {
             kind: first.kind,
             pressure_gain: pressure,
             textures,
-            from: from.to_owned(),
+            source: source.clone(),
             settings,
         })
     }
@@ -154,16 +216,40 @@ impl Survey {
     /// the slides that were left out, and why: those of a dead sensor, copies. Errors: A file cannot be read again, or
     /// not be written.
     pub fn write(&self, to: &Path, progress: &dyn Fn(usize, usize)) -> Result<Vec<String>> {
-        let textures = (1..).zip(&self.textures).map(|(id, name)| Texture {
+        let command = format!("tactus import {} ...", self.source.path().display());
+        let mut writer = RecordingWriter::begin(to, self.texture_list(), &command)?;
+        let mut written = 0;
+        let left_out = self.each_slide(&mut |slide, labels| {
+            writer.label(labels);
+            writer.write(&slide)?;
+            written += 1;
+            progress(written, self.slides());
+            Ok(())
+        })?;
+        self.write_settings(to)?;
+        writer.finish()?;
+        Ok(left_out)
+    }
+
+    /// Writes the settings that say all that was found beside the recordings in a folder.
+    pub fn write_settings(&self, folder: &Path) -> Result<()> {
+        let path = folder.join(SETTINGS);
+        fs::write(&path, self.settings().template()).map_err(|why| RecordingError::at(&path, why))
+    }
+
+    fn texture_list(&self) -> Vec<Texture> {
+        let numbered = (1..).zip(&self.textures).map(|(id, name)| Texture {
             id,
             name: name.clone(),
         });
-        let command = format!("tactus import {} ...", self.from.display());
-        let mut writer = RecordingWriter::begin(to, textures.collect(), &command)?;
-        let folder = match self.from.is_dir() {
-            true => self.from.as_path(),
-            false => self.from.parent().unwrap_or(&self.from),
-        };
+        numbered.collect()
+    }
+
+    /// Gives away each slide with its labels. Returns the slides that were left out, and why.
+    fn each_slide(
+        &self,
+        take: &mut dyn FnMut(Recording, Labels) -> Result<()>,
+    ) -> Result<Vec<String>> {
         let places = self.textures.iter().zip(0..);
         let places: HashMap<&String, usize> = places.collect();
         let mut numbers = vec![0_u32; self.textures.len()];
@@ -171,13 +257,11 @@ impl Survey {
         let mut left_out = Vec::new();
         // the parts of a file lie next to each other
         for parts in self.found.chunk_by(|a, b| a.path == b.path) {
-            let path = folder.join(&parts[0].path);
-            let signals = Signals::read(&path)?;
-            let at = |why: String| RecordingError::at(&path, why);
+            let (signals, place) = self.source.signals(&parts[0].path)?;
+            let at = |why: String| RecordingError::at(&place, why);
             let how = How::new(&signals, &self.settings).map_err(at)?;
             for found in parts {
                 let texture = places.get(&found.texture).copied().unwrap_or(0);
-                writer.label(self.labels(found));
                 let pac = how.pac(&signals, &self.channel, found.rows.clone(), self.gain);
                 let ends = found.ranges.slides.iter().chain(&found.ranges.still);
                 if ends.map(|range| range.end).max().unwrap_or(0) > pac.len() {
@@ -205,14 +289,10 @@ impl Survey {
                         continue;
                     }
                     numbers[texture] += 1;
-                    writer.write(&slide)?;
-                    progress(numbers.iter().sum::<u32>() as usize, self.slides());
+                    take(slide, self.labels(found))?;
                 }
             }
         }
-        fs::write(to.join(SETTINGS), self.settings().template())
-            .map_err(|why| RecordingError::at(&to.join(SETTINGS), why))?;
-        writer.finish()?;
         Ok(left_out)
     }
 }
@@ -221,7 +301,10 @@ impl Survey {
     fn labels(&self, found: &Found) -> Labels {
         Labels {
             session: found.session.clone(),
-            run: found.path.clone(),
+            run: match &self.source {
+                Source::Files(_) => found.path.clone(),
+                Source::Memory(all) => memory::run(all, &found.path),
+            },
             finger: FingerCode::OTHER,
             sensor: self
                 .settings
@@ -331,7 +414,8 @@ fn textures(found: &[Found]) -> std::result::Result<Vec<String>, String> {
         .find(|texture| slides[texture.as_str()] == 0)
     {
         Some(texture) => Err(format!(
-            "no sliding was found in the files of {texture}; say where it is by --window FROM,TO, or move them away"
+            "no sliding was found in the recordings of {texture}; say where it is by --window FROM,TO (in Python by \
+             cut=False), or leave them out"
         )),
         None => Ok(textures),
     }

@@ -268,7 +268,7 @@ fn span(values: &[f64]) -> f64 {
 }
 
 /// Fewest samples of a slide: spectra of some frames.
-const LEAST: usize = 1100;
+pub(super) const LEAST: usize = 1100;
 /// Most samples of P_AC of a file: two hours.
 const MOST_SAMPLES: f64 = 7200.0 * PAC_RATE_HZ as f64;
 

@@ -1,0 +1,152 @@
+//! Features of a user's own: a row for each slide.
+
+use std::collections::HashMap;
+
+use numpy::PyArray2;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use tactus_core::explorer::{Config, Method};
+use tactus_core::features::{
+    FEATURE_STEPS, FUSED_BANDS, Movement, Observation, PropertySet, fixed,
+};
+use tactus_core::table::{Action, Table as Read};
+use tactus_lab::eval::evaluate::explorer;
+
+use crate::error::Raise as _;
+use crate::samples::numbers;
+use crate::table::Table;
+use crate::values::rows;
+use crate::work::work;
+
+/// Largest feature.
+const MOST: f64 = i16::MAX as f64 / FEATURE_STEPS as f64;
+
+/// Rows of features.
+///
+/// # Errors
+/// `TypeError` for what are no real numbers; `ValueError` for another shape, and features that a table does not hold.
+pub(crate) fn observations(given: &Bound<'_, PyAny>) -> PyResult<Vec<Observation>> {
+    let (shape, values) = numbers("the features", given)?;
+    let features = match shape[..] {
+        [features] => features,
+        [_, features] => features,
+        _ => {
+            let say = "features have the shape (slides, features)";
+            return Err(PyValueError::new_err(say));
+        }
+    };
+    if !(1..=FUSED_BANDS).contains(&features) {
+        return Err(PyValueError::new_err(format!(
+            "{features} features, and a table has 1 to {FUSED_BANDS} of them: choose the best, or reduce them first, \
+             as by sklearn.decomposition.PCA({FUSED_BANDS})"
+        )));
+    }
+    if let Some(value) = values
+        .iter()
+        .find(|value| value.is_nan() || value.abs() > MOST)
+    {
+        return Err(PyValueError::new_err(format!(
+            "a feature of {value}, and a table holds -{MOST:.1} to {MOST:.1}: take logarithms, or scale them, as \
+             TactusClassifier does"
+        )));
+    }
+    let row = |row: &[f64]| Observation {
+        bands: row.iter().filter_map(|x| fixed(*x as f32)).collect(),
+        ..Observation::default()
+    };
+    Ok(values.chunks_exact(features).map(row).collect())
+}
+
+/// One row of features.
+///
+/// # Errors
+/// As [`observations`]; `ValueError` for several rows.
+pub(crate) fn one(given: &Bound<'_, PyAny>) -> PyResult<Observation> {
+    match <[Observation; 1]>::try_from(observations(given)?) {
+        Ok([one]) => Ok(one),
+        Err(rows) => {
+            let say = format!("{} slides at once; give one row of features", rows.len());
+            Err(PyValueError::new_err(say))
+        }
+    }
+}
+
+/// Rows by their labels: the names in the order in which they come first, and of each the first so many rows.
+///
+/// # Errors
+/// As [`observations`]; `ValueError` where there is not a label for each row.
+pub(crate) fn labelled(
+    given: &Bound<'_, PyAny>,
+    labels: Option<&Bound<'_, PyAny>>,
+    most: usize,
+) -> PyResult<(Vec<String>, Vec<Vec<Observation>>)> {
+    let labels = labels.ok_or_else(|| {
+        PyTypeError::new_err("give Recordings, or features of shape (slides, features) and labels")
+    })?;
+    let observed = observations(given)?;
+    let names: PyResult<Vec<String>> = labels
+        .try_iter()?
+        .map(|label| Ok(label?.str()?.to_string()))
+        .collect();
+    let names = names?;
+    if names.len() != observed.len() {
+        let say = format!("{} labels for {} slides", names.len(), observed.len());
+        return Err(PyValueError::new_err(say));
+    }
+    let (mut places, mut known, mut all) = (HashMap::new(), Vec::new(), Vec::new());
+    for (name, slide) in names.into_iter().zip(observed) {
+        let place = *places.entry(name.clone()).or_insert_with(|| {
+            known.push(name);
+            all.push(Vec::new());
+            all.len() - 1
+        });
+        if all[place].len() < most {
+            all[place].push(slide);
+        }
+    }
+    Ok((known, all))
+}
+
+/// The movement of slides of which nothing else is known.
+pub(crate) const MOVEMENT: Movement = Movement::UNKNOWN;
+
+/// The probability of each texture of a table after one slide, if it is one of them: float32 of shape (slides,
+/// textures).
+#[pyfunction]
+fn _posteriors<'py>(
+    py: Python<'py>,
+    table: &Table,
+    slides: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let (bytes, observed) = (table.bytes.clone(), observations(slides)?);
+    let textures = usize::from(Read::read(&bytes).map_err(|why| why.raise())?.textures());
+    let all = work(py, move |between| {
+        let config = Config {
+            method: Method::Fused,
+            open: false,
+            ..Config::default()
+        };
+        let mut explorer =
+            explorer(&bytes, PropertySet::ALL, config, None).map_err(|why| why.raise())?;
+        let action = Action {
+            movement: 0,
+            property: None,
+        };
+        let mut all = Vec::with_capacity(observed.len() * textures);
+        for slide in &observed {
+            between();
+            explorer.restart();
+            let taken = explorer.observe(action, slide);
+            taken.map_err(|why| why.raise())?;
+            all.extend_from_slice(explorer.posterior());
+        }
+        Ok::<_, PyErr>(all)
+    })?;
+    rows(py, all, textures)
+}
+
+pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("MAX_FEATURES", FUSED_BANDS)?;
+    module.add("_MOST", MOST)?;
+    module.add_function(wrap_pyfunction!(_posteriors, module)?)
+}
