@@ -40,7 +40,7 @@ fn rig(finger: Finger, setup: Setup) -> SimRig {
     rig
 }
 
-/// Of all textures in two trials, the share that is told by name.
+/// Of all textures, in two trials in the campaign, the share that is told by name.
 fn told(world: &Collection, bytes: &[u8], finger: Finger) -> f64 {
     let table = Table::read(bytes).unwrap();
     let config = Config {
@@ -48,9 +48,10 @@ fn told(world: &Collection, bytes: &[u8], finger: Finger) -> f64 {
         open: true,
         ..Config::default()
     };
+    let trials = 11..11 + count(2, 1);
     let visits: Vec<(u16, u8, u64)> = (0..)
         .zip(&world.textures)
-        .flat_map(|(at, texture)| [11, 12].map(|trial| (at, *texture, trial)))
+        .flat_map(|(at, texture)| trials.clone().map(move |trial| (at, *texture, trial)))
         .collect();
     let told = visits
         .par_iter()
