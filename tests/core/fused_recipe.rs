@@ -114,7 +114,12 @@ fn a_learned_table_is_calibrated_as_the_recipe_says() {
     }
     println!("{same} of {all} told alike, {kinds:?}");
     assert!(same as f64 >= 0.95 * all as f64, "{same} of {all}");
-    assert!(kinds[..3].iter().all(|count| *count > 100), "{kinds:?}");
+    // a name that fits and has changed all the same is rare
+    let [new, changed, sure, undecided] = kinds;
+    assert!(
+        new.min(sure).min(undecided) > 100 && changed > 5,
+        "{kinds:?}"
+    );
 }
 
 /// Canonical variates are the recipe's whitened features, turned: all distances are the same.

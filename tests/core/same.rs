@@ -164,7 +164,8 @@ fn told_new(known: &(RigCalibration, Vec<u8>), set: Option<f32>) -> usize {
     let others = (1..=117).filter(|texture| !known_ones.contains(texture));
     let is_new = |texture: &u8| {
         let identify = Identify {
-            max_slides: 1,
+            // one slide makes only what is far new, whatever the share
+            max_slides: 2,
             seed: 4,
             ..Identify::default()
         };
