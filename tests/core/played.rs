@@ -153,6 +153,7 @@ fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
             measurement: measure(&plan, &stretch(slide, STRETCH_S)).unwrap(),
             hash: slide.hash(),
             session: Default::default(),
+            given: None,
         };
         slides.iter().map(observed).collect()
     };

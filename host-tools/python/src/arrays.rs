@@ -38,7 +38,11 @@ pub(crate) struct Columns<'a, 'py> {
 }
 
 /// The words for each of so many arrays.
-fn words(name: &str, given: Option<&Bound<'_, PyAny>>, arrays: usize) -> PyResult<Vec<String>> {
+pub(crate) fn words(
+    name: &str,
+    given: Option<&Bound<'_, PyAny>>,
+    arrays: usize,
+) -> PyResult<Vec<String>> {
     let Some(given) = given else {
         return Ok(vec![String::new(); arrays]);
     };
@@ -52,7 +56,7 @@ fn words(name: &str, given: Option<&Bound<'_, PyAny>>, arrays: usize) -> PyResul
     };
     let words: Vec<String> = given.try_iter()?.map(word).collect::<PyResult<_>>()?;
     if words.len() != arrays {
-        let say = format!("{name}: {} of them for {arrays} arrays", words.len());
+        let say = format!("{name}: {} of them for {arrays} slides", words.len());
         return Err(PyValueError::new_err(say));
     }
     Ok(words)

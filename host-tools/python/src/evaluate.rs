@@ -9,6 +9,7 @@ use tactus_lab::eval::learn::Expected;
 use crate::arguments;
 use crate::error::Raise as _;
 use crate::recordings::Recordings;
+use crate::rows;
 use crate::values::object;
 use crate::work::work_on_all_cores;
 
@@ -32,7 +33,9 @@ struct Arguments {
 #[pyfunction]
 fn evaluate<'py>(
     py: Python<'py>,
-    recordings: &Recordings,
+    recordings: &Bound<'py, PyAny>,
+    labels: Option<&Bound<'py, PyAny>>,
+    sessions: Option<&Bound<'py, PyAny>>,
     arguments: Arguments,
 ) -> PyResult<Bound<'py, PyAny>> {
     let Arguments {
@@ -53,7 +56,13 @@ fn evaluate<'py>(
         ..Expected::default()
     };
     let features = arguments::features(arguments.features.as_deref())?;
-    let (names, slides) = (recordings.set.names(), recordings.measured(py)?);
+    let (names, slides) = match recordings.cast::<Recordings>() {
+        Ok(recordings) => {
+            let recordings = recordings.get();
+            (recordings.set.names(), recordings.measured(py)?)
+        }
+        Err(_) => rows::slides(recordings, labels, sessions)?,
+    };
     let train = arguments.train_slides;
     let request = EvaluationRequest {
         method,

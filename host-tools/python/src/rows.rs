@@ -1,6 +1,7 @@
 //! Features of a user's own: a row for each slide.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use numpy::PyArray2;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -10,8 +11,10 @@ use tactus_core::features::{
     FEATURE_STEPS, FUSED_BANDS, Movement, Observation, PropertySet, fixed,
 };
 use tactus_core::table::{Action, Table as Read};
+use tactus_lab::data::replay::MeasuredSlide;
 use tactus_lab::eval::evaluate::explorer;
 
+use crate::arrays::words;
 use crate::error::Raise as _;
 use crate::samples::numbers;
 use crate::table::Table;
@@ -71,40 +74,71 @@ pub(crate) fn one(given: &Bound<'_, PyAny>) -> PyResult<Observation> {
     }
 }
 
-/// Rows by their labels: the names in the order in which they come first, and of each the first so many rows.
+/// Rows by their labels: the names in the order in which they come first, and of each the places of its rows.
 ///
 /// # Errors
-/// As [`observations`]; `ValueError` where there is not a label for each row.
-pub(crate) fn labelled(
+/// As [`observations`]; `TypeError` without labels, `ValueError` where there is not a label for each row.
+#[expect(
+    clippy::type_complexity,
+    reason = "names, places and rows belong together"
+)]
+fn labelled(
     given: &Bound<'_, PyAny>,
     labels: Option<&Bound<'_, PyAny>>,
-    most: usize,
-) -> PyResult<(Vec<String>, Vec<Vec<Observation>>)> {
-    let labels = labels.ok_or_else(|| {
-        PyTypeError::new_err("give Recordings, or features of shape (slides, features) and labels")
-    })?;
-    let observed = observations(given)?;
-    let names: PyResult<Vec<String>> = labels
-        .try_iter()?
-        .map(|label| Ok(label?.str()?.to_string()))
-        .collect();
-    let names = names?;
-    if names.len() != observed.len() {
-        let say = format!("{} labels for {} slides", names.len(), observed.len());
-        return Err(PyValueError::new_err(say));
+) -> PyResult<(Vec<String>, Vec<Vec<usize>>, Vec<Observation>)> {
+    if labels.is_none() {
+        let say = "give Recordings, or features of shape (slides, features) and labels";
+        return Err(PyTypeError::new_err(say));
     }
-    let (mut places, mut known, mut all) = (HashMap::new(), Vec::new(), Vec::new());
-    for (name, slide) in names.into_iter().zip(observed) {
+    let observed = observations(given)?;
+    let (mut known, mut all) = (Vec::new(), Vec::<Vec<usize>>::new());
+    let mut places = HashMap::new();
+    let names = words("labels", labels, observed.len())?;
+    for (at, name) in names.into_iter().enumerate() {
         let place = *places.entry(name.clone()).or_insert_with(|| {
             known.push(name);
             all.push(Vec::new());
             all.len() - 1
         });
-        if all[place].len() < most {
-            all[place].push(slide);
-        }
+        all[place].push(at);
     }
-    Ok((known, all))
+    Ok((known, all, observed))
+}
+
+/// Rows to learn from: the names, and of each the first so many rows.
+///
+/// # Errors
+/// As [`labelled`].
+pub(crate) fn to_learn(
+    given: &Bound<'_, PyAny>,
+    labels: Option<&Bound<'_, PyAny>>,
+    most: usize,
+) -> PyResult<(Vec<String>, Vec<Vec<Vec<Observation>>>)> {
+    let (names, places, observed) = labelled(given, labels)?;
+    let first = |places: Vec<usize>| {
+        let rows = places.into_iter().take(most);
+        vec![rows.map(|at| observed[at].clone()).collect()]
+    };
+    Ok((names, places.into_iter().map(first).collect()))
+}
+
+/// Rows as slides of recordings, in the order of time: the names, and the slides of each.
+///
+/// # Errors
+/// As [`labelled`]; `ValueError` where there is not a session for each row.
+pub(crate) fn slides(
+    given: &Bound<'_, PyAny>,
+    labels: Option<&Bound<'_, PyAny>>,
+    sessions: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Vec<String>, Arc<Vec<Vec<MeasuredSlide>>>)> {
+    let (names, places, observed) = labelled(given, labels)?;
+    let sessions = words("sessions", sessions, observed.len())?;
+    let slide = |at: usize| {
+        let features = observed[at].clone();
+        MeasuredSlide::given(at as u32 + 1, features, sessions[at].clone())
+    };
+    let of = |places: Vec<usize>| places.into_iter().map(slide).collect();
+    Ok((names, Arc::new(places.into_iter().map(of).collect())))
 }
 
 /// The movement of slides of which nothing else is known.

@@ -89,8 +89,7 @@ impl Table {
         let expected = expected(drift, false_alarm)?;
         let Ok(recordings) = recordings.cast::<Recordings>() else {
             let most = train_slides.unwrap_or(usize::MAX);
-            let (names, rows) = rows::labelled(recordings, labels, most)?;
-            let observed: Vec<_> = rows.into_iter().map(|rows| vec![rows]).collect();
+            let (names, observed) = rows::to_learn(recordings, labels, most)?;
             return Self::of(work_on_all_cores(py, move |_| {
                 let movements = [rows::MOVEMENT];
                 learn_for(

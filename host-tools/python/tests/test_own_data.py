@@ -218,15 +218,21 @@ def test_features_of_ones_own_make_the_same_table_as_those_of_slides():
         slide, row = told.measured_slides(name)[5], columns["ln_fused_bands"][columns["name"] == name][5]
         answers = tactus.identify(by_slides, [slide]), tactus.identify(by_rows, [row])
         assert answers[0] == answers[1] and answers[0]["texture"] == name
+    drawn = dict(runs=300, train_slides=3, features="bands")
+    for protocol in "interleaved", "drift":
+        ours = tactus.evaluate(columns["ln_fused_bands"], columns["name"], protocol=protocol, **drawn)
+        assert ours == tactus.evaluate(told, protocol=protocol, **drawn)
     for rows, names, said in [
         (columns["ln_fused_bands"], None, "labels"),
-        (columns["ln_fused_bands"], labels[:3], "3 labels for 18"),
+        (columns["ln_fused_bands"], labels[:3], "3 of them for 18"),
         (np.zeros((18, tactus.MAX_FEATURES + 1)), labels, "PCA"),
         (100 * columns["ln_fused_bands"], labels, "scale"),
         (np.full((18, 2), np.nan), labels, "NaN"),
     ]:
         with pytest.raises((TypeError, ValueError), match=said):
             tactus.Table.learn(rows, names)
+    with pytest.raises(ValueError, match="sessions"):
+        tactus.evaluate(columns["ln_fused_bands"], labels, sessions=["a"])
     with pytest.raises(tactus.TableError):
         tactus.Explorer(by_rows).update([1.0, 2.0])
 

@@ -4,8 +4,10 @@ use std::collections::HashMap;
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
-use tactus_core::dsp::Plan;
-use tactus_core::features::{Measurement, Movement, Property, PropertySet, Slide, SlideError};
+use tactus_core::dsp::{BINS, Plan, Spectrum};
+use tactus_core::features::{
+    Measurement, Movement, Observation, Property, PropertySet, Slide, SlideError,
+};
 use tactus_core::rig::Rig;
 use tactus_core::table::SlideHash;
 
@@ -35,6 +37,8 @@ pub struct MeasuredSlide {
     pub hash: SlideHash,
     /// Session and run, as [`Labels`] have them; empty if unknown.
     pub session: [String; 2],
+    /// Features of one's own, where these count in place of the measurement's.
+    pub given: Option<Observation>,
 }
 
 impl MeasuredSlide {
@@ -47,7 +51,39 @@ impl MeasuredSlide {
             measurement: measure(plan, slide)?,
             hash: slide.hash(),
             session: [labels.session.clone(), labels.run.clone()],
+            given: None,
         })
+    }
+
+    /// Features of one's own as a slide of an unknown movement; `number` is that among all slides.
+    pub fn given(number: u32, features: Observation, session: String) -> Self {
+        let mut hash = SlideHash::default();
+        hash.iter_mut()
+            .zip(number.to_le_bytes())
+            .for_each(|(to, from)| *to = from);
+        Self {
+            number,
+            movement: Movement::UNKNOWN,
+            measurement: Measurement {
+                properties: features.properties,
+                roughness_is_bound: false,
+                clipped: None,
+                pdc: None,
+                pace: None,
+                bands: 0,
+                background: 0.0,
+                spectrum: Spectrum::from([0.0; BINS]),
+            },
+            hash,
+            session: [session, String::new()],
+            given: Some(features),
+        }
+    }
+
+    /// The features that textures are told apart by.
+    pub fn observation(&self) -> Observation {
+        let measured = || Observation::from(&self.measurement);
+        self.given.clone().unwrap_or_else(measured)
     }
 }
 

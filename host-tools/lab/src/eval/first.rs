@@ -98,7 +98,7 @@ pub fn learn_first(
     let first: Vec<Vec<Vec<&MeasuredSlide>>> = textures.iter().map(of_texture).collect();
     let observed = |slides: &Vec<&MeasuredSlide>| -> Vec<Observation> {
         let slides = slides.iter();
-        slides.map(|s| Observation::from(&s.measurement)).collect()
+        slides.map(|s| s.observation()).collect()
     };
     let rows = first.iter();
     let observed: Vec<Vec<Vec<Observation>>> =

@@ -91,10 +91,11 @@ def __getattr__(name):
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def evaluate(recordings, **arguments):
+def evaluate(recordings, labels=None, sessions=None, **arguments):
     """Play virtual explorations and count the right answers, as `tactus evaluate` does.
 
-    recordings: `Recordings`; every texture is the unknown one in turn.
+    recordings: `Recordings`; every texture is the unknown one in turn. Or features of one's own, as of `Table.learn`, in the
+    order of time, with a label for each slide, and its session where it is known.
     method: "fused", "fused-cycle", "fused-random", "student-all", "student", "paper", "cycle" or "random".
     protocol: "interleaved", "blocked", "drift", "leave-one-session-out" or "leave-one-run-out": which
         slides are learned from, and which are tested.
@@ -109,7 +110,7 @@ def evaluate(recordings, **arguments):
     `reliability`, `confused`.
     Raises TactusError where the slides do not suffice, ValueError for an argument, KeyboardInterrupt after Ctrl-C.
     """
-    return _tactus.evaluate(recordings, _arguments(arguments))
+    return _tactus.evaluate(recordings, labels, sessions, _arguments(arguments))
 
 
 def identify(table, slides, **arguments):

@@ -195,7 +195,9 @@ class Table:
     def __len__(self) -> int: ...
 
 def evaluate(
-    recordings: Recordings,
+    recordings: Union[Recordings, _Rows],
+    labels: Optional[_Labels] = None,
+    sessions: Optional[_Labels] = None,
     *,
     method: str = "fused",
     protocol: str = "interleaved",

@@ -156,7 +156,7 @@ impl Divided<'_> {
         }
         let observed = |slides: Vec<&MeasuredSlide>| -> Vec<Observation> {
             let slides = slides.into_iter();
-            slides.map(|s| Observation::from(&s.measurement)).collect()
+            slides.map(|s| s.observation()).collect()
         };
         Pool {
             train: observed(self.train),
