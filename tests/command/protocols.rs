@@ -66,13 +66,13 @@ fn a_shift_between_sessions_shows_by_session_only() {
         )
     };
     let (within, turns) = figures("interleaved");
-    assert!(within > 0.9 && turns.is_none(), "{within}");
+    assert!(within > 0.75 && turns.is_none(), "{within}");
     let (by_session, turns) = figures("leave-one-session-out");
     assert!(by_session < 0.5, "{by_session}");
     assert_eq!(turns.unwrap(), "Tested in turn: 2 parts, day1, day2.");
     // every file is a run of its own here, and the other files of its day are learned from
     let (by_run, turns) = figures("leave-one-run-out");
-    assert!(by_run > 0.9, "{by_run}");
+    assert!(by_run > 0.75, "{by_run}");
     assert_says(&turns.unwrap(), &["65 parts, day1 "]);
     let text = at.printed(&format!("{evaluate} leave-one-session-out"));
     assert_says(
