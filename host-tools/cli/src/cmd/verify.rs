@@ -79,7 +79,8 @@ pub(crate) struct Args {
     format: Format,
 }
 
-const ITSELF: &str = "--sample is the reference itself: give other slides, or --material with another texture of the folder";
+const ITSELF: &str = "--sample is the reference itself: give other slides, or --material with another texture of \
+    the folder";
 
 struct Made {
     number: u32,
