@@ -79,6 +79,9 @@ pub(crate) struct Args {
     format: Format,
 }
 
+const ITSELF: &str = "--sample is the reference itself: give other slides, or --material with another texture of \
+    the folder";
+
 struct Made {
     number: u32,
     movement: Movement,
@@ -89,6 +92,9 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let Some(folder) = &args.sample else {
         return run_simulated(args, out);
     };
+    let reference_folder = args.reference.as_deref();
+    let is_itself = reference_folder.is_some_and(|reference| same_folder(reference, folder));
+    ensure!(!is_itself || args.material.is_some(), ITSELF);
     let (set, mut measured) = measure_folder(folder)?;
     let sample = one(&set, args.material.as_deref(), folder, "--material")?;
     let sample_name = set.textures()[sample].name.clone();
@@ -278,10 +284,7 @@ fn reference(
         .material
         .as_deref()
         .is_none_or(|m| find_material(&set, m).ok() == Some(index));
-    ensure!(
-        !(is_same_folder && same_texture),
-        "--sample is the reference itself: give other slides, or --material with another texture of the folder"
-    );
+    ensure!(!(is_same_folder && same_texture), ITSELF);
     let bytes = match given {
         Some((file, table)) => of_one_finger(&set, table)
             .and_then(|()| Ok(put(table, name, &measured[index])?))

@@ -59,7 +59,8 @@ fn used(experiment: &Experiment, run: u64) -> (Vec<Mark>, Vec<Mark>) {
     let mut shown = Vec::new();
     for movement in 0..experiment.movements.len() {
         while let Some(slide) = run.slide(movement) {
-            assert_eq!(mark(slide)[0] as usize, run.unknown);
+            let name = format!("t{}", mark(slide)[0]);
+            assert_eq!(name, experiment.names()[run.unknown]);
             shown.push(mark(slide));
         }
     }
@@ -144,8 +145,8 @@ fn what_is_short_of_slides_is_named_and_left_out_or_all_learn_from_fewer() {
     assert_eq!(one.notes, ["Left out, with too few slides: t1."]);
     assert_eq!(
         used(&one, 1).1[0][0],
-        1,
-        "unknown is an index of those that are left"
+        2,
+        "the second of those that are left"
     );
     // half of them
     let few: &[_] = &[(0, 0, 0, 4)];
