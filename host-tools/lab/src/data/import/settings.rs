@@ -244,8 +244,8 @@ impl Match<'_> {
     }
 }
 
-/// The parts of a path by a pattern such as `{session}/{texture}_*.wav`, of at most [`MAX_PATTERN`] bytes; a star stands
-/// for anything but a slash.
+/// The parts of a path by a pattern such as `{session}/{texture}_*.wav`, of at most [`MAX_PATTERN`] bytes. A star is
+/// anything but a slash.
 pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
     let mut parts = Vec::new();
     let mut rest = pattern;
