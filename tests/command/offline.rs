@@ -177,9 +177,10 @@ fn features_prints_the_golden_columns() {
     let at = Scratch::new().with("BIOTAC", folder.to_str().unwrap());
     let ours = at.printed("features --recordings BIOTAC --format csv");
     let golden = fs::read_to_string(folder.join("features.csv")).unwrap();
-    let bands: String = (0..8).map(|n| format!(",ln_psd_band{n}")).collect();
+    let bands: String = (0..12).map(|n| format!(",ln_fused_band{n}")).collect();
     let properties = "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln";
-    let header = format!("{properties}{bands},name,force_n,speed_mm_s,trial");
+    let header =
+        format!("{properties}{bands},pdc_mean,pdc_sd,session,run,name,force_n,speed_mm_s,trial");
     assert_eq!(ours.lines().next(), Some(&header[..]));
     let keys = |text: &str| -> Vec<String> {
         let rows = text

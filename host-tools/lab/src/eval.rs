@@ -1,6 +1,7 @@
 //! Texture tables learned from recorded slides, and how well they tell textures apart.
 
 pub mod alike;
+pub mod basis;
 mod calibrate;
 pub mod courses;
 mod enough;

@@ -4,18 +4,24 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tactus_core::features::{BAND_EDGES, Property};
-use tactus_lab::data::replay::trials;
+use tactus_core::features::{
+    FEATURE_STEPS, FUSED_BANDS, FeatureSet, Movement, Observation, Property,
+};
+use tactus_lab::data::recording::{SlideKey, Texture};
+use tactus_lab::data::recordings::{RecordingSet, npy};
+use tactus_lab::data::replay::{MeasuredSlide, trials};
+use tactus_lab::eval::basis::best_features;
 
 use super::args::Recordings;
 use super::textures::measure_folder;
 
-/// Print the properties and band powers of every recorded slide
+/// Print the properties and the features of every recorded slide
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   tactus features --recordings DIR
-  tactus features --recordings DIR --format csv > features.csv")]
+  tactus features --recordings DIR --format csv > features.csv
+  tactus features --recordings DIR --format npz > features.npz    numpy.load gives X, y, sessions, runs")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
@@ -30,6 +36,8 @@ enum Rows {
     Csv,
     /// An object for every slide on a line of its own, for programs
     Json,
+    /// Arrays of numpy, for other classifiers: the features that the method `fused` would use of these slides
+    Npz,
     /// Aligned, for people
     Text,
 }
@@ -40,101 +48,221 @@ struct SlideFeatures<'s> {
     name: &'s str,
     slide: u32,
     trial: usize,
-    force_n: f32,
-    speed_mm_s: f32,
+    force_n: Option<f32>,
+    speed_mm_s: Option<f32>,
     traction_n: Option<f32>,
     roughness_ln: Option<f32>,
     roughness_is_bound: bool,
     fineness_unfiltered_ln: Option<f32>,
-    ln_psd_bands: Vec<f32>,
+    /// `null` where the sensor does not measure a band.
+    ln_fused_bands: [Option<f32>; FUSED_BANDS],
+    pdc_mean: Option<f32>,
+    pdc_sd: Option<f32>,
+    session: &'s str,
+    run: &'s str,
+    #[serde(skip)]
+    movement: Movement,
+}
+
+impl<'s> SlideFeatures<'s> {
+    fn of(texture: &'s Texture, slide: &MeasuredSlide, trial: usize, key: &'s SlideKey) -> Self {
+        let measurement = &slide.measurement;
+        let value = |property| measurement.properties.get(property);
+        let known = |value: f32| slide.movement.is_known().then_some(value);
+        let bands = measurement.fused_bands();
+        let (pdc_mean, pdc_sd) = measurement.pdc.unzip();
+        Self {
+            material: texture.id,
+            name: &texture.name,
+            slide: slide.number,
+            trial,
+            force_n: known(slide.movement.force_n()),
+            speed_mm_s: known(slide.movement.speed_mm_s()),
+            traction_n: value(Property::Traction),
+            roughness_ln: value(Property::Roughness),
+            roughness_is_bound: measurement.roughness_is_bound,
+            fineness_unfiltered_ln: value(Property::Fineness),
+            ln_fused_bands: std::array::from_fn(|band| {
+                (band < measurement.bands).then_some(bands[band])
+            }),
+            pdc_mean,
+            pdc_sd,
+            session: &key.labels.session,
+            run: &key.labels.run,
+            movement: slide.movement,
+        }
+    }
+
+    fn properties(&self) -> [Option<f32>; 3] {
+        [
+            self.traction_n,
+            self.roughness_ln,
+            self.fineness_unfiltered_ln,
+        ]
+    }
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (set, measured) = measure_folder(&args.from.folder()?)?;
-    let textures = set.textures().iter().zip(&measured);
-    let rows = textures.flat_map(|(texture, slides)| {
-        let numbered = slides.iter().zip(trials(slides));
-        numbered.map(move |(slide, trial)| (texture, slide, trial))
+    if args.format == Rows::Npz {
+        // as it is: what is printed has no bytes that do not print
+        return Ok(std::io::stdout().write_all(&arrays(&set, &measured))?);
+    }
+    let textures = set.textures().iter().zip(&measured).enumerate();
+    let rows = textures.flat_map(|(index, (texture, slides))| {
+        let numbered = slides.iter().zip(trials(slides)).zip(set.slides(index));
+        numbered.map(move |((slide, trial), key)| SlideFeatures::of(texture, slide, trial, key))
     });
     match args.format {
-        Rows::Csv => {
-            let bands = (0..BAND_EDGES.len() - 1).map(|band| format!(",ln_psd_band{band}"));
-            writeln!(
-                out,
-                "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln{},name,force_n,speed_mm_s,trial",
-                bands.collect::<String>()
-            )?;
-            for (texture, slide, trial) in rows {
-                write!(out, "{},{}", texture.id, slide.number)?;
-                for property in Property::ALL {
-                    let value = slide.measurement.properties.get(property);
-                    write!(
-                        out,
-                        ",{}",
-                        value.map_or(String::new(), |value| format!("{value:.6}"))
-                    )?;
-                }
-                for band in slide.measurement.ln_bands() {
-                    write!(out, ",{band:.6}")?;
-                }
-                let (force_n, speed_mm_s) = (slide.movement.force_n(), slide.movement.speed_mm_s());
-                let name = csv_field(&texture.name);
-                writeln!(out, ",{name},{force_n:.3},{speed_mm_s:.3},{trial}")?;
+        Rows::Csv => csv(rows, out),
+        Rows::Text => text(rows, out),
+        Rows::Json | Rows::Npz => {
+            for row in rows {
+                writeln!(out, "{}", serde_json::to_string(&row)?)?;
             }
-        }
-        Rows::Json => {
-            for (texture, slide, trial) in rows {
-                let measurement = &slide.measurement;
-                let value = |property| measurement.properties.get(property);
-                let features = SlideFeatures {
-                    material: texture.id,
-                    name: &texture.name,
-                    slide: slide.number,
-                    trial,
-                    force_n: slide.movement.force_n(),
-                    speed_mm_s: slide.movement.speed_mm_s(),
-                    traction_n: value(Property::Traction),
-                    roughness_ln: value(Property::Roughness),
-                    roughness_is_bound: measurement.roughness_is_bound,
-                    fineness_unfiltered_ln: value(Property::Fineness),
-                    ln_psd_bands: measurement.ln_bands().into_iter().collect(),
-                };
-                writeln!(out, "{}", serde_json::to_string(&features)?)?;
-            }
-        }
-        Rows::Text => {
-            writeln!(
-                out,
-                "no. {:<24} slide  {:<20} traction N  roughness   fineness  ln of eight bands, 20 to 1000 Hz",
-                "texture", "movement"
-            )?;
-            for (texture, slide, _) in rows {
-                let (id, name, number) = (texture.id, &texture.name, slide.number);
-                let movement = slide.movement.to_string();
-                write!(out, "{id:>3} {name:<24} {number:>5}  {movement:<20}")?;
-                for property in Property::ALL {
-                    let value = slide.measurement.properties.get(property);
-                    let value = value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-                    write!(out, " {value:>10}")?;
-                }
-                write!(out, " ")?;
-                for band in slide.measurement.ln_bands() {
-                    write!(out, " {band:>5.1}")?;
-                }
-                let is_bound = slide.measurement.roughness_is_bound;
-                writeln!(
-                    out,
-                    "{}",
-                    if is_bound {
-                        "  (not rougher than this)"
-                    } else {
-                        ""
-                    }
-                )?;
-            }
+            Ok(())
         }
     }
+}
+
+fn csv<'s>(
+    rows: impl Iterator<Item = SlideFeatures<'s>>,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    let bands: String = (0..FUSED_BANDS)
+        .map(|band| format!(",ln_fused_band{band}"))
+        .collect();
+    let properties = "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln";
+    writeln!(
+        out,
+        "{properties}{bands},pdc_mean,pdc_sd,session,run,name,force_n,speed_mm_s,trial"
+    )?;
+    let cell = |value: Option<f32>, digits: usize| {
+        value.map_or(String::new(), |value| format!("{value:.digits$}"))
+    };
+    for row in rows {
+        write!(out, "{},{}", row.material, row.slide)?;
+        let pdc = [row.pdc_mean, row.pdc_sd];
+        for value in row
+            .properties()
+            .iter()
+            .chain(&row.ln_fused_bands)
+            .chain(&pdc)
+        {
+            write!(out, ",{}", cell(*value, 6))?;
+        }
+        let [session, run, name] = [row.session, row.run, row.name].map(csv_field);
+        let (force, speed) = (cell(row.force_n, 3), cell(row.speed_mm_s, 3));
+        writeln!(out, ",{session},{run},{name},{force},{speed},{}", row.trial)?;
+    }
     Ok(())
+}
+
+fn text<'s>(
+    rows: impl Iterator<Item = SlideFeatures<'s>>,
+    out: &mut impl Write,
+) -> anyhow::Result<()> {
+    writeln!(
+        out,
+        "no. {:<24} slide  {:<20} traction N  roughness   fineness  P_DC mean, scatter  ln of twelve bands",
+        "texture", "movement"
+    )?;
+    for row in rows {
+        let (movement, slide) = (row.movement.to_string(), row.slide);
+        write!(
+            out,
+            "{:>3} {:<24} {slide:>5}  {movement:<20}",
+            row.material, row.name
+        )?;
+        let value = |value: Option<f32>, digits: usize| {
+            value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+        };
+        for property in row.properties() {
+            write!(out, " {:>10}", value(property, 3))?;
+        }
+        let [mean, scatter] = [row.pdc_mean, row.pdc_sd].map(|pdc| value(pdc, 1));
+        write!(out, " {mean:>10} {scatter:>8} ")?;
+        for band in row.ln_fused_bands {
+            write!(out, " {:>5}", value(band, 1))?;
+        }
+        let bound = ["", "  (not rougher than this)"][usize::from(row.roughness_is_bound)];
+        writeln!(out, "{bound}")?;
+    }
+    Ok(())
+}
+
+/// The features that the method `fused` would use of these slides, as a `.npz` file.
+fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> Vec<u8> {
+    let observed = |slide: &MeasuredSlide| Observation::from(&slide.measurement);
+    let slides: Vec<Vec<Vec<Observation>>> = measured
+        .iter()
+        .map(|slides| {
+            let of = |movement: Movement| {
+                let same = slides.iter().filter(|slide| slide.movement == movement);
+                same.map(observed).collect()
+            };
+            set.movements().into_iter().map(of).collect()
+        })
+        .collect();
+    let features = best_features(&slides);
+    let mut names = match features {
+        FeatureSet::Force => vec!["traction_n".to_owned()],
+        FeatureSet::Pressure => ["pdc_mean_100", "pdc_sd_100"].map(str::to_owned).to_vec(),
+        FeatureSet::Bands => Vec::new(),
+        FeatureSet::Properties => Property::ALL
+            .map(|property| property.name().to_owned())
+            .to_vec(),
+    };
+    if features != FeatureSet::Properties {
+        let bands = slides.iter().flatten().flatten().map(|s| s.bands.len());
+        let bands = bands.min().unwrap_or(0);
+        names.extend((0..bands).map(|band| format!("ln_fused_band{band}")));
+    }
+    let rows = || {
+        let textures = set.textures().iter().zip(measured).enumerate();
+        textures.flat_map(|(index, (texture, slides))| {
+            let keys = slides.iter().zip(set.slides(index));
+            keys.map(move |(slide, key)| (texture, slide, key))
+        })
+    };
+    let mut x = Vec::new();
+    for (_, slide, _) in rows() {
+        let mut observed = observed(slide);
+        observed
+            .bands
+            .truncate(names.len().saturating_sub(features.others()));
+        let vector = observed.vector(features, names.len()).unwrap_or_default();
+        x.extend(vector.iter().map(|steps| f32::from(*steps) / FEATURE_STEPS));
+    }
+    let all = rows().count();
+    let floats = |values: Vec<f32>, shape: &[usize]| {
+        let bytes: Vec<u8> = values.into_iter().flat_map(f32::to_le_bytes).collect();
+        npy::array("<f4", shape, &bytes)
+    };
+    let numbers: Vec<u8> = rows()
+        .flat_map(|(_, slide, _)| slide.number.to_le_bytes())
+        .collect();
+    let movement = |of: fn(Movement) -> f32| {
+        let known = |m: Movement| if m.is_known() { of(m) } else { f32::NAN };
+        floats(rows().map(|(_, s, _)| known(s.movement)).collect(), &[all])
+    };
+    let words = |of: fn(&SlideKey) -> &str| npy::words(rows().map(|(_, _, key)| of(key)));
+    npy::zipped(&[
+        ("X", floats(x, &[all, names.len()])),
+        (
+            "y",
+            npy::words(rows().map(|(texture, ..)| texture.name.as_str())),
+        ),
+        (
+            "feature_names",
+            npy::words(names.iter().map(String::as_str)),
+        ),
+        ("slides", npy::array("<u4", &[all], &numbers)),
+        ("sessions", words(|key| &key.labels.session)),
+        ("runs", words(|key| &key.labels.run)),
+        ("force_n", movement(Movement::force_n)),
+        ("speed_mm_s", movement(Movement::speed_mm_s)),
+    ])
 }
 
 /// A text as a cell: a spreadsheet takes what begins like a formula for one, unless there is an apostrophe before it.

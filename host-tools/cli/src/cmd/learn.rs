@@ -4,11 +4,12 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail, ensure};
-use tactus_core::features::Movement;
+use tactus_core::features::{Movement, Observation};
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{FALSE_ALARM, MAX_LEARNED, Table};
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{CutSlide, MeasuredSlide, measure_cut};
+use tactus_lab::eval::basis;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::first::{learn_first, learned_textures};
 use tactus_lab::eval::learn::{Expected, know_lengths};
@@ -116,6 +117,17 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     for note in &learned.notes {
         writeln!(out, "{note}")?;
     }
+    let observed = learned.textures.iter().map(|texture| {
+        let of = |movement: &Movement| {
+            let slides = measured[*texture].iter();
+            let same = slides.filter(|slide| slide.movement == *movement);
+            let observed = same.map(|slide| Observation::from(&slide.measurement));
+            observed.take(args.train_slides).collect()
+        };
+        learned.movements.iter().map(of).collect()
+    });
+    let observed: Vec<Vec<Vec<Observation>>> = observed.collect();
+    writeln!(out, "{}", basis::in_words(Table::read(&bytes)?, &observed))?;
     let fewest = |texture: &usize| {
         let of = |movement: &Movement| {
             let slides = measured[*texture].iter();

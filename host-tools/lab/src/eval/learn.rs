@@ -12,6 +12,7 @@ use tactus_core::table::{
 };
 use tactus_link::for_probe;
 
+use super::basis::{best_features, length};
 use super::calibrate::limits;
 use super::learned::note_learned;
 use super::pace;
@@ -58,27 +59,6 @@ pub fn measured(slides: &Slides) -> PropertySet {
         .fold(PropertySet::ALL, |set, slide| {
             set.and(slide.properties.measured())
         })
-}
-
-/// The best features that every slide has: force, else P_DC, else bands alone, else the three properties.
-pub(crate) fn best_features(slides: &Slides) -> FeatureSet {
-    let has = |set: FeatureSet| {
-        let mut all = slides.iter().flatten().flatten();
-        all.all(|slide| length(set, slide) > 0 && slide.vector(set, length(set, slide)).is_some())
-    };
-    FeatureSet::ALL
-        .into_iter()
-        .find(|&set| has(set))
-        .unwrap_or(FeatureSet::Bands)
-}
-
-/// Number of features that a slide has of a set; 0 where it has no band.
-fn length(set: FeatureSet, slide: &Observation) -> usize {
-    match set {
-        FeatureSet::Properties => 3,
-        _ if slide.bands.is_empty() => 0,
-        _ => set.others() + slide.bands.len(),
-    }
 }
 
 /// Learns a table for a method; the fused one from `features`, or the best there are, for the usual drift.

@@ -28,6 +28,56 @@ pub fn array(kind: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// The file of an array of words.
+pub fn words<'w>(words: impl Iterator<Item = &'w str>) -> Vec<u8> {
+    let words: Vec<Vec<char>> = words.map(|word| word.chars().collect()).collect();
+    // numpy has no words of no letter
+    let longest = words.iter().map(Vec::len).max().unwrap_or(0).max(1);
+    let letter = |word: &Vec<char>, n: usize| word.get(n).map_or(0, |c| u32::from(*c));
+    let letters = words
+        .iter()
+        .flat_map(|word| (0..longest).map(move |n| letter(word, n)));
+    let data: Vec<u8> = letters.flat_map(u32::to_le_bytes).collect();
+    array(&format!("<U{longest}"), &[words.len()], &data)
+}
+
+/// A `.npz` file of these arrays, each by its name: a zip archive whose files are not packed.
+pub fn zipped(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    let (mut file, mut list) = (Vec::new(), Vec::new());
+    for (name, array) in arrays {
+        let name = format!("{name}.npy");
+        let mut crc = flate2::Crc::new();
+        crc.update(array);
+        let size = (array.len() as u32).to_le_bytes();
+        // version 2.0, no flag, not packed, midnight of 1 January 1980
+        let mut about = vec![20, 0, 0, 0, 0, 0, 0, 0, 0x21, 0];
+        for part in [crc.sum().to_le_bytes(), size, size] {
+            about.extend(part);
+        }
+        about.extend((name.len() as u16).to_le_bytes());
+        about.extend([0, 0]);
+        list.extend(b"PK\x01\x02\x14\0");
+        list.extend(&about);
+        list.extend([0; 10]);
+        list.extend((file.len() as u32).to_le_bytes());
+        list.extend(name.as_bytes());
+        file.extend(b"PK\x03\x04");
+        file.extend(&about);
+        file.extend(name.as_bytes());
+        file.extend(array);
+    }
+    let (begin, length) = (file.len() as u32, list.len() as u32);
+    let number = (arrays.len() as u16).to_le_bytes();
+    file.extend(list);
+    file.extend(b"PK\x05\x06\0\0\0\0");
+    file.extend(number);
+    file.extend(number);
+    file.extend(length.to_le_bytes());
+    file.extend(begin.to_le_bytes());
+    file.extend([0, 0]);
+    file
+}
+
 /// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write()`] make
 /// them.
 ///
