@@ -5,7 +5,6 @@ use std::fs;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use serde_json::Value;
 
 use crate::import::wav;
 use crate::{Scratch, array, assert_says};

@@ -48,16 +48,20 @@ pub(super) fn length(set: FeatureSet, slide: &Observation) -> usize {
 
 /// Compares the features of a set beside the bands between the slides of each texture.
 fn beside(set: FeatureSet, slides: &Slides) -> Beside {
-    let (resolution, values): (i32, fn(&Observation) -> Option<[i16; 2]>) = match set {
-        FeatureSet::Pressure => (COUNT, |slide| slide.pressure),
-        FeatureSet::Force => (MILLINEWTON, |slide| {
-            let traction = slide.properties.get(Property::Traction)?;
-            let steps = (traction * FEATURE_STEPS).round() as i16;
-            Some([steps; 2])
-        }),
+    let resolution = match set {
+        FeatureSet::Pressure => COUNT,
+        FeatureSet::Force => MILLINEWTON,
         FeatureSet::Bands | FeatureSet::Properties => return Beside::Moves,
     };
-    let mut moves = false;
+    let values = |slide: &Observation| -> Option<[i16; 2]> {
+        if set == FeatureSet::Pressure {
+            return slide.pressure;
+        }
+        let traction = slide.properties.get(Property::Traction)?;
+        Some([(traction * FEATURE_STEPS).round() as i16; 2])
+    };
+    // single slides do not say it
+    let mut moves = slides.iter().flatten().all(|cell| cell.len() < 2);
     for cell in slides.iter().flatten() {
         let mut ends: Option<[[i16; 2]; 2]> = None;
         for slide in cell {

@@ -60,7 +60,7 @@ fn used(experiment: &Experiment, run: u64) -> (Vec<Mark>, Vec<Mark>) {
     for movement in 0..experiment.movements.len() {
         while let Some(slide) = run.slide(movement) {
             let name = format!("t{}", mark(slide)[0]);
-            assert_eq!(name, experiment.names()[run.unknown]);
+            assert_eq!(name, experiment.names[run.unknown]);
             shown.push(mark(slide));
         }
     }
