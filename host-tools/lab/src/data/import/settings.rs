@@ -203,6 +203,7 @@ pub(super) struct Named {
 pub(super) const MAX_PATTERN: usize = 256;
 
 /// A part of a pattern.
+#[derive(Clone, Copy)]
 enum Part<'p> {
     Letter(char),
     /// The first letter of a field of this name.
@@ -224,7 +225,7 @@ struct Match<'p> {
 impl Match<'_> {
     /// True if the parts from this one on are the path from this place on; fields and stars are as short as can be.
     fn fits(&mut self, part: usize, at: usize) -> bool {
-        let Some(kind) = self.parts.get(part) else {
+        let Some(kind) = self.parts.get(part).copied() else {
             return at == self.path.len();
         };
         let state = part * (self.path.len() + 1) + at;
@@ -235,9 +236,15 @@ impl Match<'_> {
         let is_name = next.is_some_and(|c| c != '/');
         self.begins[part] = at;
         let fits = match kind {
-            Part::Letter(letter) => next == Some(*letter) && self.fits(part + 1, at + 1),
+            Part::Letter(letter) => next == Some(letter) && self.fits(part + 1, at + 1),
             Part::Field(_) => is_name && self.fits(part + 1, at + 1),
-            Part::Rest => self.fits(part + 1, at) || is_name && self.fits(part, at + 1),
+            Part::Rest if self.fits(part + 1, at) => true,
+            Part::Rest => {
+                let fits = is_name && self.fits(part, at + 1);
+                // where it goes on is not where it begins
+                self.begins[part] = at;
+                fits
+            }
         };
         self.failed[state] = !fits;
         fits

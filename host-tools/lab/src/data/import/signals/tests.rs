@@ -153,7 +153,8 @@ proptest! {
         comma in any::<bool>(),
         quoted in any::<bool>(),
     ) {
-        let comma = comma && mark != ',';
+        // between blanks a comma may be either
+        let comma = comma && (mark == ';' || mark == '\t');
         let text = |x: &f64| {
             let text = format!("{x:.3}");
             let text = if comma { text.replace('.', ",") } else { text };
