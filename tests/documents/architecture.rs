@@ -23,7 +23,7 @@ chip/slots.rs SPI1 TIM2; chip/watchdog.rs IWDG
 board.rs DBGMCU FLASH RCC; chip/bank2.rs FLASH; chip/rescue.rs RCC
 bench/silicon.rs TIM2; selftest/chip.rs FLASH GPIOA RCC";
 /// Most exceptions: long functions, functions with many arguments, wide lines of Rust and of Markdown.
-const EXCEPTIONS: [usize; 4] = [16, 5, 35, 0];
+const EXCEPTIONS: [usize; 4] = [16, 6, 35, 0];
 
 /// Files below a folder with this extension: names from the top, and texts.
 fn files(folder: &str, extension: &str) -> Vec<(String, String)> {
