@@ -95,11 +95,19 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let reference_folder = args.reference.as_deref();
     let is_itself = reference_folder.is_some_and(|reference| same_folder(reference, folder));
     ensure!(!is_itself || args.material.is_some(), ITSELF);
+    // what is wrong with the question is said before what is wrong with the sample
+    let of_table = match args.reference {
+        Some(_) => None,
+        None => Some(reference(args, folder, &[])?),
+    };
     let (set, mut measured) = measure_folder(folder)?;
     let sample = one(&set, args.material.as_deref(), folder, "--material")?;
     let sample_name = set.textures()[sample].name.clone();
     let mut slides = measured.swap_remove(sample);
-    let (bytes, texture) = reference(args, folder, &slides)?;
+    let (bytes, texture) = match of_table {
+        Some(of_table) => of_table,
+        None => reference(args, folder, &slides)?,
+    };
     let table = Table::read(&bytes)?;
     of_one_finger(&set, table)?;
     let left_out = LeftOut::of(table, &mut slides, |slide| slide.hash);
