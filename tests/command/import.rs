@@ -273,6 +273,51 @@ fn a_gap_leaves_its_slide_out_and_is_named() {
     assert!(!said.contains("cork/1.csv: 1 slide left out"));
 }
 
+/// A day on which all is half as loud, imported at a gain of its own and at that of the first day.
+#[test]
+fn another_day_is_imported_like_the_first() {
+    let at = Scratch::new();
+    for (texture, (name, _)) in TEXTURES.iter().enumerate() {
+        for number in 0..EACH {
+            let first = recording(texture, number, 2200.0, 1.0);
+            at.write(
+                &format!("one/{name}/{number}.wav"),
+                wav(2200, 32, &[&first]),
+            );
+            let second = recording(texture, number + EACH, 2200.0, 1.0);
+            let second: Vec<f64> = second.iter().map(|x| 0.5 * x).collect();
+            at.write(
+                &format!("two/{name}/{number}.wav"),
+                wav(2200, 32, &[&second]),
+            );
+        }
+    }
+    at.printed("import one recordings");
+    at.printed("import two apart");
+    let evaluate = "evaluate --recordings recordings --runs 100 --test";
+    assert_says(
+        &at.error(&format!("{evaluate} apart"), 1),
+        &["counts per unit", "--like ", "recordings`"],
+    );
+    at.printed("import two more --like recordings");
+    at.printed(&format!("{evaluate} more"));
+    let loudness = |folder: &str| {
+        let set = RecordingSet::open(&at.path(folder)).unwrap();
+        let slides = set.load_texture(0).unwrap();
+        let pac = slides[0].pac();
+        let steady = &pac[slides[0].steady(2200)];
+        let squares = steady.iter().map(|x| f64::from(*x).powi(2));
+        (squares.sum::<f64>() / steady.len() as f64).sqrt()
+    };
+    let [one, apart, more] = ["recordings", "apart", "more"].map(loudness);
+    assert!((apart / one - 1.0).abs() < 0.2, "{one} {apart}");
+    assert!((more / one - 0.5).abs() < 0.1, "{one} {more}");
+    assert_says(
+        &at.error("import two again --like two", 1),
+        &["import.toml: no such file"],
+    );
+}
+
 #[test]
 fn a_first_look_writes_what_can_be_corrected() {
     let at = Scratch::new();

@@ -20,6 +20,11 @@ pub fn for_probe(table: &Table<'_>) -> Vec<u8> {
     }
 }
 
+/// CRC-32 of the table as a probe has it: see [`for_probe`].
+pub fn checksum(table: &Table<'_>) -> u32 {
+    Table::read(&for_probe(table)).map_or(table.crc(), |bare| bare.crc())
+}
+
 /// Gives the probe another table: begins, writes it in parts of [`PART`] bytes, each when the one before is done, and
 /// has it taken into use.
 #[derive(Clone, Debug)]

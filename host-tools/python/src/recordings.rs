@@ -35,7 +35,7 @@ pub(crate) struct Recordings {
 }
 
 /// What the slides of each texture measure.
-type Measured = Vec<Vec<MeasuredSlide>>;
+pub(crate) type Measured = Vec<Vec<MeasuredSlide>>;
 
 /// One recorded slide with its samples.
 #[pyclass(frozen, module = "tactus")]

@@ -16,6 +16,7 @@ use tactus_lab::eval::evaluate::explorer;
 
 use crate::arrays::words;
 use crate::error::Raise as _;
+use crate::recordings::Measured;
 use crate::samples::numbers;
 use crate::table::Table;
 use crate::values::rows;
@@ -105,6 +106,9 @@ fn labelled(
     Ok((known, all, observed))
 }
 
+/// Per texture and movement the slides to learn from.
+pub(crate) type ToLearn = Vec<Vec<Vec<Observation>>>;
+
 /// Rows to learn from: the names, and of each the first so many rows.
 ///
 /// # Errors
@@ -113,7 +117,7 @@ pub(crate) fn to_learn(
     given: &Bound<'_, PyAny>,
     labels: Option<&Bound<'_, PyAny>>,
     most: usize,
-) -> PyResult<(Vec<String>, Vec<Vec<Vec<Observation>>>)> {
+) -> PyResult<(Vec<String>, ToLearn)> {
     let (names, places, observed) = labelled(given, labels)?;
     let first = |places: Vec<usize>| {
         let rows = places.into_iter().take(most);
@@ -130,7 +134,7 @@ pub(crate) fn slides(
     given: &Bound<'_, PyAny>,
     labels: Option<&Bound<'_, PyAny>>,
     sessions: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Vec<String>, Arc<Vec<Vec<MeasuredSlide>>>)> {
+) -> PyResult<(Vec<String>, Arc<Measured>)> {
     let (names, places, observed) = labelled(given, labels)?;
     let sessions = words("sessions", sessions, observed.len())?;
     let slide = |at: usize| {

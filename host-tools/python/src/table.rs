@@ -216,10 +216,10 @@ impl Table {
         })
     }
 
-    /// CRC-32 of the table, eight hexadecimal digits.
+    /// CRC-32 of the table as a probe has it, eight hexadecimal digits.
     #[getter]
     fn checksum(&self) -> PyResult<String> {
-        Ok(format!("{:08x}", self.read()?.crc()))
+        Ok(format!("{:08x}", tactus_link::checksum(&self.read()?)))
     }
 
     fn __reduce__<'py>(
@@ -244,7 +244,7 @@ impl Table {
         let bytes = self.bytes.len();
         Ok(format!(
             "<tactus.Table for {method}: {textures} textures, {bytes} bytes, checksum {:08x}>",
-            table.crc()
+            tactus_link::checksum(&table)
         ))
     }
 }

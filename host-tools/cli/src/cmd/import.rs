@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use tactus_lab::data::import::foreign::{Found, Survey};
 use tactus_lab::data::import::settings::{SETTINGS, Settings};
 use tactus_lab::data::import::{self, is_known};
@@ -29,6 +29,7 @@ Examples:
   tactus import log.csv recordings --texture material   # a column of words names the texture
   tactus import data recordings --rate 1000 --channel z --texture '{session}/{texture}_*.csv'
   tactus import data recordings --dry-run               # shows what was found, and writes nothing
+  tactus import day2 more --like recordings             # another day, to be compared with the first
   git clone https://github.com/dexrob/BioTac_slide_20_50
   tactus import BioTac_slide_20_50 recordings")]
 pub(crate) struct Args {
@@ -43,6 +44,10 @@ pub(crate) struct Args {
     /// Write import.toml with what was found, to be corrected, and nothing else
     #[arg(long, conflicts_with = "dry_run")]
     template: bool,
+    /// Take rate, channel, gain and all else that is not given from recordings that were imported before: slides are
+    /// comparable at the same gain only
+    #[arg(long, value_name = "RECORDINGS")]
+    like: Option<PathBuf>,
     #[command(flatten)]
     settings: Settings,
 }
@@ -75,8 +80,18 @@ fn known(args: &Args, to: &std::path::Path, out: &mut impl Write) -> anyhow::Res
 }
 
 fn signals(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let mut settings = args.settings.clone();
+    if let Some(folder) = &args.like {
+        let of = folder.join(SETTINGS);
+        ensure!(
+            of.is_file(),
+            "{}: no such file; --like takes a folder that `tactus import` wrote",
+            of.display()
+        );
+        settings = settings.with_file(folder)?;
+    }
     let bar = progress(0, "looking at files");
-    let survey = Survey::of(&args.from, args.settings.clone(), &|done, all| {
+    let survey = Survey::of(&args.from, settings, &|done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     });
@@ -89,7 +104,7 @@ fn signals(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             false => args.from.parent().unwrap_or(&args.from),
         };
         let path = folder.join(SETTINGS);
-        anyhow::ensure!(
+        ensure!(
             !path.exists(),
             "{} is there already; change it, or remove it first",
             path.display()

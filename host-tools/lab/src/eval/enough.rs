@@ -22,7 +22,7 @@ pub struct Enough {
 
 impl Enough {
     /// Chooses from textures of which `has` says how many slides each can be learned from at a movement. A movement at
-    /// which less than half as many textures have [`LEAST`] slides as at the best one is left out, then the textures
+    /// which less than half as many textures have two slides as at the best one is left out, then the textures
     /// that have fewer at another. The slides are `wanted`, or as many as more than half of these textures have, and
     /// the textures with less are left out. `None`: none has enough.
     pub fn of(

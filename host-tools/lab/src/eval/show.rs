@@ -322,7 +322,7 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         count(table.textures(), "texture"),
         count(table.movements().len() as u64, "movement"),
         table.as_bytes().len(),
-        table.crc()
+        tactus_link::checksum(&table)
     )?;
     let calibrated = day(table.calibrated()).unwrap_or_else(|| "not said".to_owned());
     writeln!(

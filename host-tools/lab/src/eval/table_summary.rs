@@ -73,7 +73,7 @@ impl TableSummary {
     pub fn new(table: Table<'_>) -> Self {
         Self {
             bytes: table.as_bytes().len(),
-            checksum: format!("{:08x}", table.crc()),
+            checksum: format!("{:08x}", tactus_link::checksum(&table)),
             features: match table.contents() {
                 Contents::Gaussians(_) => "properties",
                 Contents::Fused(set, _) => set.name(),

@@ -1,9 +1,10 @@
 //! The arguments of `tactus evaluate`, and the experiment that they describe.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
+use tactus_lab::data::import::settings::Settings;
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::{Experiment, Protocol};
@@ -126,9 +127,20 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
             .with_context(|| file.display().to_string())?;
         (experiment, "properties")
     } else {
-        let (set, measured) = measure_folder(&args.from.folder()?)?;
+        let folder = args.from.folder()?;
+        let (set, measured) = measure_folder(&folder)?;
         let test = args.test.as_deref().map(measure_folder).transpose()?;
         if let Some((test, _)) = &test {
+            let gain = |of: &Path| anyhow::Ok(Settings::default().with_file(of)?.gain);
+            if let (Some(here), Some(there)) = (gain(&folder)?, gain(test.folder())?) {
+                ensure!(
+                    here == there,
+                    "{} was imported at {there} counts per unit, and {} at {here}: import it again with `--like {}`",
+                    test.folder().display(),
+                    folder.display(),
+                    folder.display()
+                );
+            }
             let [here, there] = [set.sensor()?, test.sensor()?];
             ensure!(
                 (here.finger, &here.name) == (there.finger, &there.name),
