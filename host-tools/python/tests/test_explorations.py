@@ -80,7 +80,8 @@ def test_a_verification_is_the_commands(biotac, command, tmp_path):
     for material in biotac.textures[:2]:
         at = ["--table", tmp_path / "table", "--texture", biotac.textures[0], "--sample", biotac.folder]
         said = json.loads(command("verify", *at, "--material", material, "--format", "json"))
-        ours = tactus.verify(table, biotac.textures[0], biotac.measured_slides(material))
+        # the command leaves the slides out that the table was learned from
+        ours = tactus.verify(table, biotac.textures[0], biotac.measured_slides(material)[5:])
         assert ours[-1]["false_accept"] == said["false_accept"]
         assert [(o["score"], o["limit"], o["answer"].lower()) for o in ours] == [
             (s["score"], s["limit"], s["answer"]) for s in said["slides"]

@@ -19,7 +19,7 @@ def test_features_are_the_commands_to_the_bit(small, biotac, command):
         assert len(rows) == len(recordings) == len(ours["slide"])
         for name in "material", "name", "slide", "trial", "roughness_is_bound":
             assert [row[name] for row in rows] == ours[name].tolist(), name
-        for name in "force_n", "speed_mm_s", "traction_n", "roughness_ln", "fineness_unfiltered_ln", "ln_psd_bands":
+        for name in "force_n", "speed_mm_s", "traction_n", "roughness_ln", "fineness_unfiltered_ln", "ln_fused_bands":
             theirs = np.array([row[name] for row in rows], np.float32)
             assert theirs.tobytes() == ours[name].tobytes(), name
 
