@@ -351,6 +351,26 @@ fn a_first_look_writes_what_can_be_corrected() {
     );
 }
 
+/// The walk of own-data.md with the extract of a robot's recordings that is in the repository.
+#[test]
+fn a_robots_terrains_are_imported_and_evaluated_as_the_page_says() {
+    let at = Scratch::new();
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/borealtc");
+    let page = include_str!("../../docs/src/own-data.md");
+    let pattern = "{texture}/imu_*.csv";
+    assert!(page.contains(&format!("--texture '{pattern}' --finger husky-imu")));
+    let said = at.printed(&format!(
+        "import {data} terrains --texture {pattern}* --finger husky-imu"
+    ));
+    assert_says(&said, &["100 Hz", "SANDY_LOAM", "terrains: written"]);
+    let told = at.json("evaluate --recordings terrains --runs 400", 0);
+    let share = |name: &str| told["verdicts"][name].as_f64().unwrap();
+    // a minute of each run at most is in the extract: of asphalt there is too little, which is said
+    assert_says(&told["notes"].to_string(), &["too few slides: ASPHALT"]);
+    assert_eq!(told["textures"], 4, "{told}");
+    assert!(share("right") > 0.5 && share("wrong") < 0.12, "{told}");
+}
+
 /// Whatever files and settings say, one sentence says what is wrong, and nothing is written.
 #[test]
 fn hostile_files_settings_and_names_are_refused() {

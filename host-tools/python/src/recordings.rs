@@ -137,15 +137,15 @@ impl Recordings {
     /// samples at least, at 2200 Hz or of the slower clock.
     ///
     /// unit: of the samples, such as "g", "m/s2" or "V"; those in "counts" stay as they are. gain: counts per unit;
-    /// what fills 12 bits without clipping is found, unless given, and told by `gain`: give it again for slides that are to
-    /// be compared with these. channel, pressure, shear: numbers of the channels, from 0, of the vibration (the
+    /// what fills 12 bits without clipping is found, unless given, and told by `gain`: give it again for slides that are
+    /// to be compared with these. channel, pressure, shear: numbers of the channels, from 0, of the vibration (the
     /// liveliest, unless given), of the contact's pressure (P_DC) and of the tangential force in N (neither, unless
     /// given). sessions, runs: one for each array, where they are known; without runs each array is one. finger: name
     /// of the sensor. force_n, speed_mm_s: the movement, if it is known.
     ///
     /// Slides of a sensor that hangs or is cut off, copies and short ones are left out with a warning. Raises
-    /// RecordingError where the arrays give no slides; TypeError and ValueError for what are no real numbers, no numbers that were measured,
-    /// or for labels that do not fit.
+    /// RecordingError where the arrays give no slides; TypeError and ValueError for what are no real numbers, no
+    /// numbers that were measured, or for labels that do not fit.
     #[staticmethod]
     #[pyo3(signature = (arrays, *, rate_hz, labels, unit=None, sessions=None, runs=None, gain=None, channel=None,
         pressure=None, shear=None, finger=None, force_n=None, speed_mm_s=None, length_s=None, cut=true))]

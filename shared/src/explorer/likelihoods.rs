@@ -178,7 +178,8 @@ impl<const N: usize> Explorer<'_, N> {
         self.log_odds = elsewhere.and_then(|(elsewhere, can_tell)| match &self.limits {
             Some(limits) => {
                 let slides = self.slides.saturating_add(1);
-                let limit = self.limit(limits, Against::Drifted, slides);
+                let share = self.config.false_alarm;
+                let limit = self.limit(limits, Against::Drifted, slides, share);
                 Some(elsewhere - top - limit)
             }
             None => can_tell.then(|| elsewhere - (top + self.mean_of(sum))),

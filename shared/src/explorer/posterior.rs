@@ -217,8 +217,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         self.log_odds.is_some_and(|log_odds| log_odds > limit)
     }
 
-    /// Whether the slides are as like one of the candidates as those of known textures mostly are: a texture is not sure
-    /// otherwise, however probable. True where the method or the table cannot tell.
+    /// Whether the slides are as like one of the candidates as those of known textures mostly are: a texture is not
+    /// sure otherwise, however probable. True where the method or the table cannot tell.
     pub fn fits(&self) -> bool {
         let limit = match &self.limits {
             Some(limits) if self.slides <= PATIENT => self.above(limits, POOR_FIT).min(0.0),
@@ -229,9 +229,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
 
     /// By how much the limit for this share of false alarms is above that for the share that is wanted.
     fn above(&self, limits: &Limits, share: f32) -> f32 {
-        let [this, wanted] = [Some(share), self.config.false_alarm]
-            .map(|share| limits.limit(Against::Drifted, self.slides, share));
-        this - wanted
+        let at = |share| self.limit(limits, Against::Drifted, self.slides, share);
+        at(Some(share)) - at(self.config.false_alarm)
     }
 
     fn is_calibrated(&self) -> bool {
@@ -248,15 +247,21 @@ impl<'t, const N: usize> Explorer<'t, N> {
     pub fn changed_by(&self) -> Option<f32> {
         let drifts = self.table.drift().is_some_and(|drift| !drift.is_none());
         let limits = self.limits.filter(|_| drifts && self.slides > 0)?;
-        let limit = self.limit(&limits, Against::Same, self.slides);
+        let share = self.config.false_alarm;
+        let limit = self.limit(&limits, Against::Same, self.slides, share);
         let score = self.score(&self.episode, Against::Same)?;
         Some(score - limit)
     }
 
-    /// The limit after so many slides; with a shorter one among them its own, where that is less.
-    #[inline(always)]
-    pub(super) fn limit(&self, limits: &Limits, against: Against, slides: u8) -> f32 {
-        let share = self.config.false_alarm;
+    /// The limit after so many slides, for this share of false alarms; with a shorter one among them its own, where
+    /// that is less.
+    pub(super) fn limit(
+        &self,
+        limits: &Limits,
+        against: Against,
+        slides: u8,
+        share: Option<f32>,
+    ) -> f32 {
         let mut least = limits.limit(against, slides, share);
         // models of shorter slides are behind those of the actions
         if self.novelty_models.len() > self.actions.len() {
