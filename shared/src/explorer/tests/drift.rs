@@ -436,7 +436,7 @@ fn known_changed_and_new_are_the_recipes() {
         changes,
         ..
     } = agreement;
-    assert!(f64::from(same) > 0.995 * f64::from(all));
+    assert!(f64::from(same) > 0.999 * f64::from(all));
     assert!(all > 4000 && news > 200 && changes > 200);
 }
 
