@@ -35,6 +35,6 @@ pub(crate) fn main() {
         let value = features.properties.get(property);
         println!("{:<10} {:.3}", property.name(), value.unwrap());
     }
-    let bands = features.fused_bands();
+    let bands = features.spectrum.fused_bands();
     println!("ln of twelve band powers {bands:.1?}");
 }

@@ -12,4 +12,4 @@ pub use fir::BandPower;
 pub use kernels::{Kernels, Reals};
 pub use microfft::Complex32;
 pub use plan::{Angles, BAND_PASS, FRAME, Folded, HALVES, HalfFilters, Plan, TAPS, Taps};
-pub use spectrum::{BIN_HZ, BINS, HOP, Spectrum, SpectrumSum};
+pub use spectrum::{BIN_HZ, BINS, FUSED_BANDS, FUSED_EDGES, HOP, Spectrum, SpectrumSum};

@@ -15,4 +15,5 @@ pub use observation::{
 pub use property::{Properties, Property, PropertySet};
 pub(crate) use signal::FROZEN;
 pub use signal::Signal;
-pub use slide::{BAND_EDGES, FUSED_BANDS, FUSED_EDGES, Measurement, Slide, SlideError, roughness};
+pub use slide::{BAND_EDGES, Measurement, Slide, SlideError, roughness};
+pub use crate::dsp::{FUSED_BANDS, FUSED_EDGES};

@@ -90,7 +90,7 @@ impl Features {
     /// float32 of shape (12,): those of the fused way of deciding, from 17 to 1000 Hz.
     #[getter]
     fn ln_fused_bands<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        array(py, self.measurement.fused_bands().to_vec())
+        array(py, self.measurement.spectrum.fused_bands().to_vec())
     }
 
     /// float32 of shape (257,): mean power spectrum of P_AC at constant speed, counts^2 per bin.
@@ -129,6 +129,7 @@ impl Features {
             clipped: measured.clipped,
             background: measured.background,
             spectrum: measured.spectrum.psd().to_vec(),
+            fused_bands: *measured.spectrum.fused_bands(),
         };
         pickled(py, "_features", &saved)
     }
@@ -227,6 +228,7 @@ struct Saved {
     clipped: Option<tactus_core::features::SlideError>,
     background: f32,
     spectrum: Vec<f32>,
+    fused_bands: [f32; FUSED_BANDS],
 }
 
 /// The `Features` that were pickled.
@@ -246,7 +248,7 @@ fn _features(saved: &str) -> PyResult<Features> {
             bands: saved.bands,
             clipped: saved.clipped,
             background: saved.background,
-            spectrum: Spectrum::from(spectrum.map_err(bins)?),
+            spectrum: Spectrum::new(spectrum.map_err(bins)?, saved.fused_bands),
         },
     })
 }

@@ -327,7 +327,7 @@ impl Recordings {
         };
         let bounds = all.iter().map(|s| s.measurement.roughness_is_bound);
         let bands = all.iter().flat_map(|s| s.measurement.ln_bands()).collect();
-        let fused = all.iter().flat_map(|s| s.measurement.fused_bands());
+        let fused = all.iter().flat_map(|s| *s.measurement.spectrum.fused_bands());
         let columns = PyDict::new(py);
         columns.set_item("material", array(py, material))?;
         columns.set_item("name", py.import("numpy")?.call_method1("array", (names,))?)?;

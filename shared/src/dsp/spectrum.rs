@@ -1,5 +1,5 @@
-//! The averaged spectrum of the unfiltered P_AC (Hann windows of 512 samples, hop 256), its centroid (eq. 18) and its
-//! band powers.
+//! The averaged spectrum of the unfiltered P_AC (Hann windows of 512 samples, hop 256), its centroid (eq. 18), its band
+//! powers, and the mean over frames of the logarithms of the power in each of [`FUSED_EDGES`].
 //!
 //! Only powers are wanted, so a frame need not be transformed as a whole and unpacked. The odd bins of n reals are a
 //! complex transform of n/4 values, each bin or its mirror image; the even ones are the transform of n/2 reals.
@@ -24,38 +24,98 @@ pub const BINS: usize = FRAME / 2 + 1;
 /// Width of a bin in Hz.
 pub const BIN_HZ: f32 = RATE_HZ as f32 / FRAME as f32;
 
+/// Number of bands of the fused way of deciding.
+pub const FUSED_BANDS: usize = 14;
+/// Their edges, from 4.3 to 1000 Hz, from 17 Hz on in nearly equal ratios, as half-open ranges of bins.
+pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] =
+    [1, 2, 4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
+/// Added to the mean power of a band of them in each frame, counts^2 per bin, before the logarithm: what rounding to
+/// whole counts adds to every bin, and a little more.
+const FUSED_FLOOR: f32 = 0.1;
+
+/// Bins of the single-sided spectrum but the last, in the order in which a frame's transforms give them: 1, 5, 9 and so
+/// on, where those beyond the last are the mirror images of 255, 251 and so on; 2, 10, 18; 4, 20, 36; 0, 8, 16.
+const ORDER: [usize; BINS - 1] = order();
+/// The band of each of them in [`FUSED_EDGES`]; [`FUSED_BANDS`] for none.
+const BAND_OF: [u8; BINS - 1] = band_of();
+/// Bands with room for the bins of none, a power of 2.
+const SLOTS: usize = (FUSED_BANDS + 1).next_power_of_two();
+
+#[allow(clippy::indexing_slicing)] // the compiler runs it, and has no iterators
+const fn order() -> [usize; BINS - 1] {
+    let mut bins = [0; BINS - 1];
+    let (mut slot, mut apart) = (0, 1);
+    while slot < BINS - 1 {
+        let places = if apart < 8 { FRAME / 4 / apart } else { FRAME / 16 };
+        let mut place = 0;
+        while place < places {
+            let bin = if apart < 8 { apart * (4 * place + 1) } else { 8 * place };
+            bins[slot] = if bin < BINS { bin } else { FRAME - bin };
+            (slot, place) = (slot + 1, place + 1);
+        }
+        apart *= 2;
+    }
+    bins
+}
+
+#[allow(clippy::indexing_slicing)] // the compiler runs it, and has no iterators
+const fn band_of() -> [u8; BINS - 1] {
+    let mut bands = [FUSED_BANDS as u8; BINS - 1];
+    let mut slot = 0;
+    while slot < BINS - 1 {
+        let mut band = 0;
+        while band < FUSED_BANDS {
+            if FUSED_EDGES[band] <= ORDER[slot] && ORDER[slot] < FUSED_EDGES[band + 1] {
+                bands[slot] = band as u8;
+            }
+            band += 1;
+        }
+        slot += 1;
+    }
+    bands
+}
+
+/// What the sum of the powers of a band's bins is multiplied by for their mean in counts^2.
+const SHARES: [f32; FUSED_BANDS] = shares();
+
+#[allow(clippy::indexing_slicing)] // the compiler runs it, and has no iterators
+const fn shares() -> [f32; FUSED_BANDS] {
+    let mut shares = [0.0; FUSED_BANDS];
+    let mut band = 0;
+    while band < FUSED_BANDS {
+        let bins = (FUSED_EDGES[band + 1] - FUSED_EDGES[band]) as f32;
+        shares[band] = 1.0 / (bins * WINDOW_POWER);
+        band += 1;
+    }
+    shares
+}
+
 /// Sum of the squares of the window, which is twice Hann's: his is 3/8 of its length.
 const WINDOW_POWER: f32 = 4.0 * FRAME as f32 * 3.0 / 8.0;
 /// Transform of the window itself at bins 0 and 1; it is 0 from bin 2 on.
 const WINDOW_BIN_0: f32 = FRAME as f32;
 const WINDOW_BIN_1: f32 = -(FRAME as f32) / 2.0;
 
-/// Sums over frames: the power of every bin in counts^2, and the two complex bins that the mean of the slide reaches.
+/// Sums over frames: the power of every bin in counts^2, and the two complex bins that the mean of the slide reaches;
+/// and products over frames of the power of every band.
 #[derive(Clone, Debug)]
 struct FrameSum {
-    /// Bins 1, 5, 9 and so on; those beyond the last are the mirror images of 255, 251 and so on.
-    odd: [f32; FRAME / 4],
-    /// Bins 2, 10, 18 and so on.
-    twice_odd: [f32; FRAME / 8],
-    /// Bins 4, 20, 36 and so on.
-    four_times_odd: [f32; FRAME / 16],
-    /// Bins 0, 8, 16 and so on.
-    eights: [f32; FRAME / 16],
+    /// In [`ORDER`].
+    powers: [f32; BINS - 1],
     last: f32,
     /// Sum of the real parts of bins 0 and 1 (the Hann window's own bins are real).
     real: [f32; 2],
     frames: u32,
+    products: [Product; FUSED_BANDS],
 }
 
 impl FrameSum {
     const ZERO: Self = Self {
-        odd: [0.0; FRAME / 4],
-        twice_odd: [0.0; FRAME / 8],
-        four_times_odd: [0.0; FRAME / 16],
-        eights: [0.0; FRAME / 16],
+        powers: [0.0; BINS - 1],
         last: 0.0,
         real: [0.0; 2],
         frames: 0,
+        products: [Product::ONE; FUSED_BANDS],
     };
 
     fn add(&mut self, plan: &Plan, folded: &mut Folded) {
@@ -67,21 +127,30 @@ impl FrameSum {
             ..
         } = plan.kernels;
         let angles = plan.angles();
+        let mut powers = [0.0; BINS - 1];
+        let ([odd_powers, even_powers], _) = powers.as_chunks_mut::<{ FRAME / 4 }>() else {
+            return;
+        };
         let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
             return;
         };
         transform(angles, odd);
-        let [real_0, real_1] = &mut self.real;
-        *real_1 += odd.first().map_or(0.0, |first| first.re);
-        add_power(odd, &mut self.odd);
+        let first = odd.first().copied().unwrap_or_default();
+        add_power(odd, odd_powers);
 
         fold(angles, reals, odd);
+        let ([odd_powers, even_powers], _) = even_powers.as_chunks_mut::<{ FRAME / 8 }>() else {
+            return;
+        };
         let ([odd, reals_2], _) = odd.as_chunks_mut::<{ FRAME / 8 }>() else {
             return;
         };
         transform(angles, odd);
-        add_power(odd, &mut self.twice_odd);
+        add_power(odd, odd_powers);
 
+        let ([odd_powers, even_powers], _) = even_powers.as_chunks_mut::<{ FRAME / 16 }>() else {
+            return;
+        };
         let ([folded, ..], _) = reals.as_chunks_mut::<{ FRAME / 8 }>() else {
             return;
         };
@@ -90,7 +159,7 @@ impl FrameSum {
             return;
         };
         transform(angles, odd);
-        add_power(odd, &mut self.four_times_odd);
+        add_power(odd, odd_powers);
 
         let mut rest = [0.0; FRAME / 8];
         let ([early, late], _) = rest.as_chunks_mut::<{ FRAME / 16 }>() else {
@@ -101,39 +170,75 @@ impl FrameSum {
         }
         let eights = transform_reals(angles, &mut rest);
         // the first of them has that of the last bin, which is real as well, in place of its imaginary part
+        let mut mean = 0.0;
         if let Some(ends) = eights.first_mut() {
-            *real_0 += ends.re;
+            mean = ends.re;
             self.last += ends.im * ends.im;
             ends.im = 0.0;
         }
-        add_power(eights, &mut self.eights);
+        add_power(eights, even_powers);
+        let [real_0, real_1] = &mut self.real;
+        *real_0 += mean;
+        *real_1 += first.re;
+        // of bin 1 without the frame's own mean, as far as a band has it
+        let real = first.re - mean / WINDOW_BIN_0 * WINDOW_BIN_1;
+        let without_mean = real * real + first.im * first.im;
+        self.add_powers(&powers, without_mean);
+    }
+
+    fn add_powers(&mut self, powers: &[f32; BINS - 1], first: f32) {
+        let mut bands = [0.0; SLOTS];
+        for ((sum, power), band) in self.powers.iter_mut().zip(powers).zip(BAND_OF) {
+            *sum += power;
+            if let Some(band) = bands.get_mut(usize::from(band) % SLOTS) {
+                *band += power;
+            }
+        }
+        let [lowest, ..] = &mut bands;
+        *lowest = first;
+        for ((product, band), share) in self.products.iter_mut().zip(bands).zip(SHARES) {
+            product.multiply(band * share + FUSED_FLOOR);
+        }
         self.frames += 1;
     }
 
     fn power(&self) -> [f32; BINS] {
         let mut power = [0.0; BINS];
-        // one loop for all, because a handheld has little room
-        let folds = [
-            &self.odd[..],
-            &self.twice_odd,
-            &self.four_times_odd,
-            &self.eights,
-        ];
-        for (sums, apart) in folds.into_iter().zip([1, 2, 4, 8]) {
-            for (place, sum) in sums.iter().enumerate() {
-                let bin = match apart {
-                    8 => 8 * place,
-                    _ => apart * (4 * place + 1),
-                };
-                // or its mirror image
-                if let Some(to) = power.get_mut(bin.min(FRAME - bin)) {
-                    *to = *sum;
-                }
+        for (bin, sum) in ORDER.into_iter().zip(self.powers) {
+            if let Some(to) = power.get_mut(bin) {
+                *to = sum;
             }
         }
         let [.., last] = &mut power;
         *last = self.last;
         power
+    }
+}
+
+/// A product of many positive numbers, of which only the logarithm is wanted: that costs one logarithm, not one each.
+#[derive(Clone, Copy, Debug)]
+struct Product {
+    /// From 1 to 2.
+    mantissa: f32,
+    exponent: i32,
+}
+
+impl Product {
+    const ONE: Self = Self {
+        mantissa: 1.0,
+        exponent: 0,
+    };
+
+    /// Multiplies by a normal number.
+    fn multiply(&mut self, by: f32) {
+        const { assert!(f32::MANTISSA_DIGITS == 24) };
+        let bits = (self.mantissa * by).to_bits();
+        self.exponent += (bits >> 23) as i32 - 127;
+        self.mantissa = f32::from_bits(bits & 0x7f_ffff | 127 << 23);
+    }
+
+    fn ln(self) -> f32 {
+        libm::logf(self.mantissa) + self.exponent as f32 * core::f32::consts::LN_2
     }
 }
 
@@ -228,7 +333,8 @@ impl SpectrumSum {
         for power in &mut psd {
             *power /= frames * WINDOW_POWER;
         }
-        Some(Spectrum { psd })
+        let fused_bands = self.sum.products.map(|product| product.ln() / frames);
+        Some(Spectrum { psd, fused_bands })
     }
 }
 
@@ -236,19 +342,25 @@ impl SpectrumSum {
 #[derive(Clone, PartialEq, Debug)]
 pub struct Spectrum {
     psd: [f32; BINS],
-}
-
-/// A spectrum of these powers, in counts^2 per bin: one that was kept somewhere.
-impl From<[f32; BINS]> for Spectrum {
-    fn from(psd: [f32; BINS]) -> Self {
-        Self { psd }
-    }
+    fused_bands: [f32; FUSED_BANDS],
 }
 
 impl Spectrum {
+    /// A spectrum of these powers, in counts^2 per bin, and these mean logarithms: one that was kept somewhere.
+    pub fn new(psd: [f32; BINS], fused_bands: [f32; FUSED_BANDS]) -> Self {
+        Self { psd, fused_bands }
+    }
+
     /// Power of every bin; bin k is at `k * BIN_HZ`.
     pub fn psd(&self) -> &[f32; BINS] {
         &self.psd
+    }
+
+    /// Mean over frames of the natural logarithm of the power in each band of [`FUSED_EDGES`], counts^2 per bin, the mean
+    /// of each frame removed and 0.1 added: a burst in one frame weighs no more than its frame, silence has a value, and
+    /// what is far below a count has hardly any.
+    pub fn fused_bands(&self) -> &[f32; FUSED_BANDS] {
+        &self.fused_bands
     }
 
     /// Spectral centroid in Hz (eq. 18); `None` for a signal without any power.

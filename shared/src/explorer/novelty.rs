@@ -18,9 +18,12 @@ pub(super) enum Source {
     Table,
 }
 
+/// So many variances are multiplied before a logarithm is taken: each is 2^-8 to 2^18, and such products are finite.
+const AT_ONCE: usize = 7;
+
 /// A squared distance from all textures that is so many of its standard deviations above its mean counts as no greater:
 /// what is unlike everything must not become known by being unlike other new textures, too.
-const FARTHEST: f32 = 8.0;
+const FARTHEST: f32 = 2.0;
 
 /// The likelihood of a texture that the table does not have: means of textures scatter as those of the table do.
 #[derive(Clone, Copy, Debug)]
@@ -97,10 +100,8 @@ impl NoveltyModel {
         }
         let v = 1.0 / f32::from(k);
         let (mut norm, mut distance) = (0.0, 0.0);
-        // two logarithms for all: variances are 2^-8 to 2^14, and products of seven numbers still
-        const HALF: usize = MAX_FEATURES / 2;
-        let known = self.mean.chunks(HALF).zip(self.variance.chunks(HALF));
-        for (means, (known, variances)) in mean.chunks(HALF).zip(known) {
+        let known = self.mean.chunks(AT_ONCE).zip(self.variance.chunks(AT_ONCE));
+        for (means, (known, variances)) in mean.chunks(AT_ONCE).zip(known) {
             let mut product = 1.0;
             for ((z, m), variance) in means.iter().zip(known).zip(variances) {
                 let total = variance + v;
@@ -122,25 +123,29 @@ impl NoveltyModel {
             return 0.0;
         };
         let v = 1.0 / f32::from(k);
-        let (mut products, mut distance) = ([1.0; 2], 0.0);
+        let (mut norm, mut distance) = (0.0, 0.0);
         let along = population.axes.apply(mean);
         let mut known = along.iter().zip(population.variances);
-        // two logarithms for all
-        for product in &mut products {
-            for (z, variance) in known.by_ref().take(MAX_FEATURES / 2) {
+        loop {
+            let mut part = known.by_ref().take(AT_ONCE).peekable();
+            if part.peek().is_none() {
+                break;
+            }
+            let mut product = 1.0;
+            for (z, variance) in part {
                 let total = variance + v;
                 let apart = white(*z);
                 distance += apart * apart / total;
-                *product *= total;
+                product *= total;
             }
+            norm += libm::logf(product);
         }
-        let [first, second] = products.map(libm::logf);
         let distance = if distance < self.farthest {
             distance
         } else {
             self.farthest
         };
-        -0.5 * (first + second + distance)
+        -0.5 * (norm + distance)
     }
 }
 

@@ -4,11 +4,12 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::property::{Properties, Property, PropertySet};
-use super::slide::{FUSED_BANDS, Measurement};
+use super::slide::Measurement;
+use crate::dsp::FUSED_BANDS;
 use crate::up_to;
 
 /// Most features of a slide.
-pub const MAX_FEATURES: usize = 14;
+pub const MAX_FEATURES: usize = 16;
 /// Parts of a feature's unit that one step of a [`Vector`] of features is.
 pub const FEATURE_STEPS: f32 = 1024.0;
 /// Parts of a within-texture standard deviation that one step of a whitened [`Vector`] is.
@@ -24,8 +25,8 @@ pub type Vector = Vec<i16, MAX_FEATURES>;
 pub enum FeatureSet {
     /// Traction in N, and logarithms of band powers.
     Force,
-    /// Mean and standard deviation of P_DC during the slide in units of 100 counts, and logarithms of band powers: for
-    /// a rig without force sensing.
+    /// Mean of P_DC during the slide in units of 100 counts, the logarithm of its scatter, and logarithms of band powers:
+    /// for a rig without force sensing.
     Pressure,
     /// Logarithms of band powers only.
     Bands,
@@ -82,7 +83,8 @@ pub struct Observation {
     pub properties: Properties,
     /// Natural logarithms of the band powers, in steps of 1/1024.
     pub bands: Vec<i16, FUSED_BANDS>,
-    /// Mean and standard deviation of P_DC, in steps of 1/1024 of 100 counts.
+    /// Mean of P_DC in steps of 1/1024 of 100 counts, and natural logarithm of its standard deviation about a parabola and
+    /// half a count, in steps of 1/1024.
     pub pressure: Option<[i16; 2]>,
     /// Natural logarithm of the mean speed in parts of the movement's, in steps of 1/1024; `None` where it was not
     /// measured.
@@ -128,17 +130,17 @@ impl From<Properties> for Observation {
 impl From<&Measurement> for Observation {
     fn from(slide: &Measurement) -> Self {
         let pressure = slide.pdc.and_then(|(mean, sd)| {
-            let (mean, sd) = (fixed(mean / PDC_UNIT)?, fixed(sd / PDC_UNIT)?);
-            Some([mean, sd])
+            Some([fixed(mean / PDC_UNIT)?, fixed(libm::logf(sd + 0.5))?])
         });
         Self {
             properties: slide.properties,
             bands: up_to(
                 slide
+                    .spectrum
                     .fused_bands()
-                    .into_iter()
+                    .iter()
                     .take(slide.bands)
-                    .filter_map(fixed),
+                    .filter_map(|band| fixed(*band)),
             ),
             pressure,
             pace: slide.pace,

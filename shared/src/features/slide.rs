@@ -11,19 +11,10 @@ use super::block::{BLOCK, Block};
 use super::movement::Movement;
 use super::property::Properties;
 use super::signal::Signal;
-use crate::dsp::{BandPower, FRAME, Plan, Spectrum, SpectrumSum, TAPS};
+use crate::dsp::{BandPower, FRAME, FUSED_BANDS, FUSED_EDGES, Plan, Spectrum, SpectrumSum, TAPS};
 
 /// Edges of eight bands from 20 to 1000 Hz in equal ratios, as half-open ranges of bins.
 pub const BAND_EDGES: [usize; 9] = [5, 8, 13, 21, 33, 54, 88, 143, 233];
-
-/// Number of bands of the fused way of deciding.
-pub const FUSED_BANDS: usize = 12;
-/// Their edges, from 17 to 1000 Hz in nearly equal ratios, as half-open ranges of bins.
-pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] =
-    [4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
-/// Added to the mean power of a band of them, counts^2 per bin, before the logarithm: what rounding to whole counts
-/// adds to every bin, and a little more.
-const FUSED_FLOOR: f32 = 0.1;
 
 /// Least share of the background power that a texture's power can be told from it.
 ///
@@ -86,8 +77,7 @@ pub struct Slide<'p> {
     signals: [Signal; 2],
     shear_mn: i64,
     shears: u32,
-    /// Sum of P_DC and of its squares, and their number.
-    pdc: (i64, u64, u32),
+    pdc: Pdc,
     pace: Option<i16>,
     bands: usize,
     lost: u32,
@@ -110,7 +100,7 @@ impl<'p> Slide<'p> {
             signals: Default::default(),
             shear_mn: 0,
             shears: 0,
-            pdc: (0, 0, 0),
+            pdc: Pdc::default(),
             pace: None,
             bands: FUSED_BANDS,
             lost: 0,
@@ -223,12 +213,7 @@ impl<'p> Slide<'p> {
 
     /// P_DC at constant speed in counts about that of the lifted finger.
     pub fn push_pdc(&mut self, samples: &[i16]) {
-        let (sum, squares, number) = &mut self.pdc;
-        for &counts in samples {
-            *sum += i64::from(counts);
-            *squares += u64::from(counts.unsigned_abs()) * u64::from(counts.unsigned_abs());
-        }
-        *number += samples.len() as u32;
+        self.pdc.push(samples);
     }
 
     /// Sets the measured speed, if any: see [`Observation::pace`](super::observation::Observation::pace).
@@ -285,7 +270,7 @@ impl<'p> Slide<'p> {
             properties: Properties::new([traction, Some(roughness), Some(libm::logf(centroid_hz))]),
             roughness_is_bound,
             clipped,
-            pdc: mean_and_sd(self.pdc),
+            pdc: self.pdc.mean_and_sd(),
             pace: self.pace,
             bands: self.bands,
             background,
@@ -294,14 +279,52 @@ impl<'p> Slide<'p> {
     }
 }
 
-/// Mean and standard deviation (n - 1) from sum, sum of squares and number; `None` of fewer than two.
-fn mean_and_sd((sum, squares, number): (i64, u64, u32)) -> Option<(f32, f32)> {
-    if number < 2 {
-        return None;
+/// P_DC during a slide: sums of it, of its products with the number of the sample and with the square of that, and of
+/// its squares.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pdc {
+    samples: u16,
+    moments: [i64; 3],
+    squares: i64,
+}
+
+impl Pdc {
+    /// Takes the next samples; those beyond 65,535 do not count.
+    fn push(&mut self, samples: &[i16]) {
+        for &counts in samples {
+            let (x, at) = (i64::from(counts), i64::from(self.samples));
+            let Some(next) = self.samples.checked_add(1) else {
+                return;
+            };
+            self.samples = next;
+            let [sum, once, twice] = &mut self.moments;
+            *sum += x;
+            *once += x * at;
+            *twice += x * at * at;
+            self.squares += x * x;
+        }
     }
-    let (sum, squares, n) = (sum as f64, squares as f64, f64::from(number));
-    let variance = ((squares - sum * sum / n) / (n - 1.0)).max(0.0);
-    Some(((sum / n) as f32, libm::sqrt(variance) as f32))
+
+    /// Mean, and standard deviation about the parabola that fits best (n - 3): what a track does slowly, and a rig that
+    /// settles, are no texture. `None` of fewer than four.
+    fn mean_and_sd(self) -> Option<(f32, f32)> {
+        if self.samples < 4 {
+            return None;
+        }
+        let n = f64::from(self.samples);
+        let [sum, once, twice] = self.moments.map(|moment| moment as f64);
+        // along 1, u and u^2 less its mean, which are at right angles; u is the number of the sample from the middle
+        let middle = (n - 1.0) / 2.0;
+        let mean_square = (n * n - 1.0) / 12.0;
+        let slope = once - middle * sum;
+        let bend = twice - 2.0 * middle * once + (middle * middle - mean_square) * sum;
+        let rest = self.squares as f64
+            - sum * sum / n
+            - slope * slope / (n * mean_square)
+            - bend * bend / (n * (n * n - 1.0) * (n * n - 4.0) / 180.0);
+        let sd = libm::sqrt((rest / (n - 3.0)).max(0.0));
+        Some(((sum / n) as f32, sd as f32))
+    }
 }
 
 /// The measurements of one slide.
@@ -313,8 +336,8 @@ pub struct Measurement {
     pub roughness_is_bound: bool,
     /// [`SlideError::Clipped`] where that is to be told, though the slide counts: see [`Signal::check`].
     pub clipped: Option<SlideError>,
-    /// Mean and standard deviation of P_DC during the slide in counts about the lifted finger's; `None` if it was not
-    /// given.
+    /// Mean of P_DC during the slide in counts about the lifted finger's, and standard deviation about the parabola that
+    /// fits best; `None` if it was not given.
     pub pdc: Option<(f32, f32)>,
     /// See [`Observation::pace`](super::observation::Observation::pace).
     pub pace: Option<i16>,
@@ -330,24 +353,10 @@ impl Measurement {
     /// Natural logarithms of the eight band powers of [`BAND_EDGES`] in counts^2 per bin, each with 0.001 added so that
     /// silence has a value.
     pub fn ln_bands(&self) -> [f32; BAND_EDGES.len() - 1] {
-        self.ln_powers(BAND_EDGES, 1e-3)
-    }
-
-    /// Natural logarithms of the twelve band powers of [`FUSED_EDGES`] in counts^2 per bin, each with 0.1 added:
-    /// silence has a value, and what is far below a count has hardly any.
-    pub fn fused_bands(&self) -> [f32; FUSED_BANDS] {
-        self.ln_powers(FUSED_EDGES, FUSED_FLOOR)
-    }
-
-    fn ln_powers<const EDGES: usize, const BANDS: usize>(
-        &self,
-        edges: [usize; EDGES],
-        floor: f32,
-    ) -> [f32; BANDS] {
-        let mut bands = [0.0; BANDS];
-        for (band, edges) in bands.iter_mut().zip(edges.windows(2)) {
+        let mut bands = [0.0; BAND_EDGES.len() - 1];
+        for (band, edges) in bands.iter_mut().zip(BAND_EDGES.windows(2)) {
             if let &[low, high] = edges {
-                *band = libm::logf(self.spectrum.band(low..high) + floor);
+                *band = libm::logf(self.spectrum.band(low..high) + 1e-3);
             }
         }
         bands

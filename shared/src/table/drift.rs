@@ -17,6 +17,12 @@ pub type Drifts = [f32; PAIRS];
 /// Pairs of axes; the last has one where the features are an odd number.
 pub const PAIRS: usize = MAX_FEATURES / 2;
 
+/// Bands below 17 Hz, each of which drifts by itself, and their drift in parts of that of the others.
+const LOW_BANDS: usize = 2;
+const LOW: f64 = 0.6;
+/// The drift of the logarithm of P_DC's scatter in parts of that of a band.
+const SCATTER: f64 = 0.5;
+
 /// The amount of drift that is expected.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Drift {
@@ -65,11 +71,17 @@ impl Drift {
         let mut covariance = [[0.0; MAX_FEATURES]; MAX_FEATURES];
         for (i, (row, mean)) in covariance.iter_mut().zip(mean).enumerate().take(features) {
             for (j, c) in row.iter_mut().enumerate().take(features) {
-                *c = if i >= others && j >= others {
-                    let band = f64::from(self.bands * FEATURE_STEPS);
+                let band = f64::from(self.bands * FEATURE_STEPS);
+                let sd = if i >= others {
+                    LOW * band
+                } else if set == FeatureSet::Pressure && i == 1 {
+                    SCATTER * band
+                } else {
+                    f64::from(self.traction) * mean
+                };
+                *c = if i.min(j) >= others + LOW_BANDS {
                     band * band * libm::exp(-0.5 * i.abs_diff(j) as f64)
                 } else if i == j {
-                    let sd = f64::from(self.traction) * mean;
                     sd * sd
                 } else {
                     0.0

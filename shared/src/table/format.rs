@@ -20,6 +20,8 @@ pub(super) const MS: usize = 2;
 pub(super) const LENGTH: u16 = 6;
 pub(super) const GAUSSIANS: u8 = 0;
 pub(super) const FUSED: u8 = 1;
+/// Code of the first of [`FeatureSet::ALL`]. Those below were of logarithms of mean spectra in twelve bands.
+const FIRST_SET: u8 = 4;
 /// Bytes of a table's header.
 pub(crate) const HEADER: usize = 16;
 pub(super) const MOVEMENT_BYTES: usize = 6;
@@ -192,7 +194,7 @@ impl Contents {
     pub(super) const fn codes(self) -> [u8; 3] {
         match self {
             Self::Gaussians(measured) => [GAUSSIANS, measured.bits(), 0],
-            Self::Fused(set, features) => [FUSED, set as u8, features],
+            Self::Fused(set, features) => [FUSED, FIRST_SET + set as u8, features],
         }
     }
 
@@ -202,7 +204,7 @@ impl Contents {
                 .filter(|set| !set.is_empty() && features == 0)
                 .map(Self::Gaussians),
             FUSED => FeatureSet::ALL
-                .get(usize::from(what))
+                .get(usize::from(what).wrapping_sub(FIRST_SET.into()))
                 .filter(|set| set.allows(features.into()))
                 .map(|set| Self::Fused(*set, features)),
             other => return Err(TableError::Method(other)),

@@ -114,9 +114,8 @@ impl<'b> Numbers<'b> {
         Self(bytes.as_chunks().0)
     }
 
-    /// Returns whether all are variances of which sums and products of [`MAX_FEATURES`] stay finite.
+    /// Returns whether all are variances of which sums of [`MAX_FEATURES`], and products of seven, stay finite.
     pub(super) fn are_variances(self, least: f32) -> bool {
-        const { assert!(MAX_FEATURES <= 14) };
         self.0.len() <= MAX_FEATURES
             && self
                 .into_iter()

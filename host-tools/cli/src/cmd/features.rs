@@ -69,7 +69,7 @@ impl<'s> SlideFeatures<'s> {
         let measurement = &slide.measurement;
         let value = |property| measurement.properties.get(property);
         let known = |value: f32| slide.movement.is_known().then_some(value);
-        let bands = measurement.fused_bands();
+        let bands = measurement.spectrum.fused_bands();
         let (pdc_mean, pdc_sd) = measurement.pdc.unzip();
         Self {
             material: texture.id,

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
-use tactus_core::dsp::{BINS, Plan, Spectrum};
+use tactus_core::dsp::{BINS, FUSED_BANDS, Plan, Spectrum};
 use tactus_core::features::{
     Measurement, Movement, Observation, Property, PropertySet, Slide, SlideError,
 };
@@ -72,7 +72,7 @@ impl MeasuredSlide {
                 pace: None,
                 bands: 0,
                 background: 0.0,
-                spectrum: Spectrum::from([0.0; BINS]),
+                spectrum: Spectrum::new([0.0; BINS], [0.0; FUSED_BANDS]),
             },
             hash,
             session: [session, String::new()],
