@@ -6,10 +6,10 @@ use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
-use tactus_core::dsp::{BIN_HZ, BINS, Plan, Spectrum};
+use tactus_core::dsp::{BIN_HZ, BINS, FUSED_BANDS, Plan, Spectrum};
 use tactus_core::features::{Measurement, Movement, Observation, Properties, Property};
 use tactus_lab::data::recording::Recording;
-use tactus_lab::data::replay::{MeasuredSlide, measure};
+use tactus_lab::data::replay::{MeasuredSlide, measure, observation};
 
 use crate::error::{Raise as _, SlideError};
 use crate::samples::samples;
@@ -35,7 +35,7 @@ impl From<&MeasuredSlide> for Features {
 impl Features {
     /// What an exploration makes of it.
     pub(crate) fn observation(&self) -> Observation {
-        Observation::from(&self.measurement)
+        observation(&self.measurement)
     }
 
     fn property(&self, property: Property) -> Option<f32> {
@@ -130,6 +130,7 @@ impl Features {
             background: measured.background,
             spectrum: measured.spectrum.psd().to_vec(),
             fused_bands: *measured.spectrum.fused_bands(),
+            frames: measured.spectrum.frames(),
         };
         pickled(py, "_features", &saved)
     }
@@ -229,6 +230,7 @@ struct Saved {
     background: f32,
     spectrum: Vec<f32>,
     fused_bands: [f32; FUSED_BANDS],
+    frames: u32,
 }
 
 /// The `Features` that were pickled.
@@ -248,7 +250,7 @@ fn _features(saved: &str) -> PyResult<Features> {
             bands: saved.bands,
             clipped: saved.clipped,
             background: saved.background,
-            spectrum: Spectrum::new(spectrum.map_err(bins)?, saved.fused_bands),
+            spectrum: Spectrum::new(saved.frames, spectrum.map_err(bins)?, saved.fused_bands),
         },
     })
 }

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use tactus_core::explorer::{Config, Method};
 use tactus_core::features::{
-    FEATURE_STEPS, FUSED_BANDS, Movement, Observation, PropertySet, fixed,
+    COARSE_BANDS, FEATURE_STEPS, Movement, Observation, PropertySet, fixed,
 };
 use tactus_core::table::{Action, Table as Read};
 use tactus_lab::data::replay::MeasuredSlide;
@@ -39,10 +39,10 @@ pub(crate) fn observations(given: &Bound<'_, PyAny>) -> PyResult<Vec<Observation
             return Err(PyValueError::new_err(say));
         }
     };
-    if !(1..=FUSED_BANDS).contains(&features) {
+    if !(1..=COARSE_BANDS).contains(&features) {
         return Err(PyValueError::new_err(format!(
-            "{features} features, and a table has 1 to {FUSED_BANDS} of them: choose the best, or reduce them first, \
-             as by sklearn.decomposition.PCA({FUSED_BANDS})"
+            "{features} features, and a table has 1 to {COARSE_BANDS} of them: choose the best, or reduce them first, \
+             as by sklearn.decomposition.PCA({COARSE_BANDS})"
         )));
     }
     if let Some(value) = values
@@ -184,7 +184,7 @@ fn _posteriors<'py>(
 }
 
 pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("MAX_FEATURES", FUSED_BANDS)?;
+    module.add("MAX_FEATURES", COARSE_BANDS)?;
     module.add("_MOST", MOST)?;
     module.add_function(wrap_pyfunction!(_posteriors, module)?)
 }

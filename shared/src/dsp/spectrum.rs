@@ -25,10 +25,12 @@ pub const BINS: usize = FRAME / 2 + 1;
 pub const BIN_HZ: f32 = RATE_HZ as f32 / FRAME as f32;
 
 /// Number of bands of the fused way of deciding.
-pub const FUSED_BANDS: usize = 14;
+pub const FUSED_BANDS: usize = 26;
 /// Their edges, from 4.3 to 1000 Hz, from 17 Hz on in nearly equal ratios, as half-open ranges of bins.
-pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] =
-    [1, 2, 4, 6, 8, 11, 16, 22, 31, 43, 60, 84, 118, 166, 233];
+pub const FUSED_EDGES: [usize; FUSED_BANDS + 1] = [
+    1, 2, 4, 5, 6, 7, 8, 9, 11, 13, 16, 19, 22, 26, 31, 37, 43, 51, 60, 71, 84, 100, 118, 140, 166,
+    197, 233,
+];
 /// Added to the mean power of a band of them in each frame, counts^2 per bin, before the logarithm: what rounding to
 /// whole counts adds to every bin, and a little more.
 const FUSED_FLOOR: f32 = 0.1;
@@ -46,10 +48,18 @@ const fn order() -> [usize; BINS - 1] {
     let mut bins = [0; BINS - 1];
     let (mut slot, mut apart) = (0, 1);
     while slot < BINS - 1 {
-        let places = if apart < 8 { FRAME / 4 / apart } else { FRAME / 16 };
+        let places = if apart < 8 {
+            FRAME / 4 / apart
+        } else {
+            FRAME / 16
+        };
         let mut place = 0;
         while place < places {
-            let bin = if apart < 8 { apart * (4 * place + 1) } else { 8 * place };
+            let bin = if apart < 8 {
+                apart * (4 * place + 1)
+            } else {
+                8 * place
+            };
             bins[slot] = if bin < BINS { bin } else { FRAME - bin };
             (slot, place) = (slot + 1, place + 1);
         }
@@ -334,21 +344,36 @@ impl SpectrumSum {
             *power /= frames * WINDOW_POWER;
         }
         let fused_bands = self.sum.products.map(|product| product.ln() / frames);
-        Some(Spectrum { psd, fused_bands })
+        Some(Spectrum {
+            frames: self.sum.frames,
+            psd,
+            fused_bands,
+        })
     }
 }
 
 /// The averaged power spectrum of a slide: mean |X|^2 over the sum of the squared window, in counts^2 per bin.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Spectrum {
+    frames: u32,
     psd: [f32; BINS],
     fused_bands: [f32; FUSED_BANDS],
 }
 
 impl Spectrum {
-    /// A spectrum of these powers, in counts^2 per bin, and these mean logarithms: one that was kept somewhere.
-    pub fn new(psd: [f32; BINS], fused_bands: [f32; FUSED_BANDS]) -> Self {
-        Self { psd, fused_bands }
+    /// A spectrum of so many frames, of these powers in counts^2 per bin and these mean logarithms: one that was kept
+    /// somewhere.
+    pub fn new(frames: u32, psd: [f32; BINS], fused_bands: [f32; FUSED_BANDS]) -> Self {
+        Self {
+            frames,
+            psd,
+            fused_bands,
+        }
+    }
+
+    /// Number of frames that it is the average of.
+    pub fn frames(&self) -> u32 {
+        self.frames
     }
 
     /// Power of every bin; bin k is at `k * BIN_HZ`.

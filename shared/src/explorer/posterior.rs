@@ -34,7 +34,7 @@ const UNKNOWN_SLIDES: u8 = 2;
 const FAR: f32 = 0.0005;
 /// Share of the known textures that fit too badly to be told as sure in the first [`PATIENT`] slides: the next one says
 /// more. Afterwards whatever is not unknown fits.
-const POOR_FIT: f32 = 0.1;
+const POOR_FIT: f32 = 0.3;
 /// See [`POOR_FIT`].
 const PATIENT: u8 = 4;
 

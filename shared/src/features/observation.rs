@@ -9,7 +9,12 @@ use crate::dsp::FUSED_BANDS;
 use crate::up_to;
 
 /// Most features of a slide.
-pub const MAX_FEATURES: usize = 16;
+pub const MAX_FEATURES: usize = 28;
+/// Bands below 17 Hz.
+pub(crate) const LOW_BANDS: usize = 2;
+/// Number of bands where each two of [`FUSED_EDGES`](crate::dsp::FUSED_EDGES) from 17 Hz on are one: few slides tell
+/// more about few features.
+pub const COARSE_BANDS: usize = LOW_BANDS + (FUSED_BANDS - LOW_BANDS) / 2;
 /// Parts of a feature's unit that one step of a [`Vector`] of features is.
 pub const FEATURE_STEPS: f32 = 1024.0;
 /// Parts of a within-texture standard deviation that one step of a whitened [`Vector`] is.
@@ -81,7 +86,8 @@ impl FeatureSet {
 pub struct Observation {
     /// The paper's three properties.
     pub properties: Properties,
-    /// Natural logarithms of the band powers, in steps of 1/1024.
+    /// Mean natural logarithms of the band powers, in steps of 1/1024: of [`FUSED_EDGES`](crate::dsp::FUSED_EDGES), or
+    /// the coarse ones where no more than [`COARSE_BANDS`] of these were measured.
     pub bands: Vec<i16, FUSED_BANDS>,
     /// Mean of P_DC in steps of 1/1024 of 100 counts, and natural logarithm of its standard deviation about a parabola and
     /// half a count, in steps of 1/1024.
@@ -110,11 +116,34 @@ impl Observation {
             }
         }
         if set != FeatureSet::Properties {
-            for band in &self.bands {
-                vector.push(*band).ok()?;
+            if vector.len() + self.bands.len() == length {
+                vector.extend_from_slice(&self.bands).ok()?;
+            } else if self.bands.len() > COARSE_BANDS {
+                vector.extend(coarse(&self.bands).take(COARSE_BANDS));
             }
         }
         (vector.len() == length).then_some(vector)
+    }
+
+    /// The same with coarse bands, made of all of [`FUSED_EDGES`](crate::dsp::FUSED_EDGES) that it has.
+    pub fn with_coarse_bands(self) -> Self {
+        Self {
+            bands: up_to(coarse(&self.bands)),
+            ..self
+        }
+    }
+
+    /// Numbers of bands that it can be compared by, the most first.
+    pub fn numbers_of_bands(&self) -> [usize; 2] {
+        let bands = self.bands.len();
+        [
+            bands,
+            if bands > COARSE_BANDS {
+                coarse(&self.bands).count()
+            } else {
+                bands
+            },
+        ]
     }
 }
 
@@ -129,23 +158,32 @@ impl From<Properties> for Observation {
 
 impl From<&Measurement> for Observation {
     fn from(slide: &Measurement) -> Self {
-        let pressure = slide.pdc.and_then(|(mean, sd)| {
-            Some([fixed(mean / PDC_UNIT)?, fixed(libm::logf(sd + 0.5))?])
-        });
-        Self {
+        let pressure = slide
+            .pdc
+            .and_then(|(mean, sd)| Some([fixed(mean / PDC_UNIT)?, fixed(libm::logf(sd + 0.5))?]));
+        let bands = slide.spectrum.fused_bands().iter().take(slide.bands);
+        let observation = Self {
             properties: slide.properties,
-            bands: up_to(
-                slide
-                    .spectrum
-                    .fused_bands()
-                    .iter()
-                    .take(slide.bands)
-                    .filter_map(|band| fixed(*band)),
-            ),
+            bands: up_to(bands.filter_map(|band| fixed(*band))),
             pressure,
             pace: slide.pace,
+        };
+        if observation.bands.len() > COARSE_BANDS {
+            observation
+        } else {
+            observation.with_coarse_bands()
         }
     }
+}
+
+/// The low bands, and the mean of each two of the others.
+fn coarse(bands: &[i16]) -> impl Iterator<Item = i16> {
+    let (low, others) = bands.split_at_checked(LOW_BANDS).unwrap_or_default();
+    let (pairs, _) = others.as_chunks();
+    let means = pairs
+        .iter()
+        .map(|&[a, b]| ((i32::from(a) + i32::from(b)) >> 1) as i16);
+    low.iter().copied().chain(means)
 }
 
 /// A feature in fixed point; one that is beyond it is at its end, and `None` is no number.

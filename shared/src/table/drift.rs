@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::matrix::Square;
-use crate::features::{FEATURE_STEPS, FeatureSet, MAX_FEATURES};
+use crate::features::{COARSE_BANDS, FEATURE_STEPS, FeatureSet, LOW_BANDS, MAX_FEATURES};
 
 /// Variances of the drift along the axes of a whitening, of each two their mean: those next to each other are much
 /// alike, for axes are in the order of their variances. 0 beyond the features.
@@ -17,8 +17,7 @@ pub type Drifts = [f32; PAIRS];
 /// Pairs of axes; the last has one where the features are an odd number.
 pub const PAIRS: usize = MAX_FEATURES / 2;
 
-/// Bands below 17 Hz, each of which drifts by itself, and their drift in parts of that of the others.
-const LOW_BANDS: usize = 2;
+/// The drift of a band below 17 Hz, each of which drifts by itself, in parts of that of the others.
 const LOW: f64 = 0.6;
 /// The drift of the logarithm of P_DC's scatter in parts of that of a band.
 const SCATTER: f64 = 0.5;
@@ -36,7 +35,7 @@ impl Default for Drift {
     /// The drift between the begin and the end of a recorded session: 0.4 dB, and 4 %.
     fn default() -> Self {
         Self {
-            bands: 0.1,
+            bands: 0.12,
             traction: 0.04,
         }
     }
@@ -68,6 +67,12 @@ impl Drift {
         mean: &[f64; MAX_FEATURES],
     ) -> Square {
         let others = set.others();
+        // neighbours differ by a band's width: of the coarse ones that is twice as much
+        let apart = if features > others + COARSE_BANDS {
+            0.25
+        } else {
+            0.5
+        };
         let mut covariance = [[0.0; MAX_FEATURES]; MAX_FEATURES];
         for (i, (row, mean)) in covariance.iter_mut().zip(mean).enumerate().take(features) {
             for (j, c) in row.iter_mut().enumerate().take(features) {
@@ -80,7 +85,7 @@ impl Drift {
                     f64::from(self.traction) * mean
                 };
                 *c = if i.min(j) >= others + LOW_BANDS {
-                    band * band * libm::exp(-0.5 * i.abs_diff(j) as f64)
+                    band * band * libm::exp(-apart * i.abs_diff(j) as f64)
                 } else if i == j {
                     sd * sd
                 } else {

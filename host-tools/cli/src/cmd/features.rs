@@ -10,7 +10,7 @@ use tactus_core::features::{
 use tactus_lab::data::recording::{SlideKey, Texture};
 use tactus_lab::data::recordings::{RecordingSet, npy};
 use tactus_lab::data::replay::{MeasuredSlide, trials};
-use tactus_lab::eval::basis::best_features;
+use tactus_lab::eval::basis::{best_features, length};
 
 use super::args::Recordings;
 use super::textures::measure_folder;
@@ -193,13 +193,12 @@ fn text<'s>(
 
 /// The features that the method `fused` would use of these slides, as a `.npz` file.
 fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> Vec<u8> {
-    let observed = |slide: &MeasuredSlide| Observation::from(&slide.measurement);
     let slides: Vec<Vec<Vec<Observation>>> = measured
         .iter()
         .map(|slides| {
             let of = |movement: Movement| {
                 let same = slides.iter().filter(|slide| slide.movement == movement);
-                same.map(observed).collect()
+                same.map(MeasuredSlide::observation).collect()
             };
             set.movements().into_iter().map(of).collect()
         })
@@ -207,15 +206,14 @@ fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> Vec<u8> {
     let features = best_features(&slides);
     let mut names = match features {
         FeatureSet::Force => vec!["traction_n".to_owned()],
-        FeatureSet::Pressure => ["pdc_mean_100", "pdc_sd_100"].map(str::to_owned).to_vec(),
+        FeatureSet::Pressure => ["pdc_mean_100", "ln_pdc_sd"].map(str::to_owned).to_vec(),
         FeatureSet::Bands => Vec::new(),
         FeatureSet::Properties => Property::ALL
             .map(|property| property.name().to_owned())
             .to_vec(),
     };
     if features != FeatureSet::Properties {
-        let bands = slides.iter().flatten().flatten().map(|s| s.bands.len());
-        let bands = bands.min().unwrap_or(0);
+        let bands = length(features, &slides).saturating_sub(features.others());
         names.extend((0..bands).map(|band| format!("ln_fused_band{band}")));
     }
     let rows = || {
@@ -227,10 +225,7 @@ fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> Vec<u8> {
     };
     let mut x = Vec::new();
     for (_, slide, _) in rows() {
-        let mut observed = observed(slide);
-        observed
-            .bands
-            .truncate(names.len().saturating_sub(features.others()));
+        let observed = slide.observation();
         let vector = observed.vector(features, names.len()).unwrap_or_default();
         x.extend(vector.iter().map(|steps| f32::from(*steps) / FEATURE_STEPS));
     }

@@ -10,7 +10,6 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{self, Config, Explorer};
-use tactus_core::features::Observation;
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::{MAX_TEXTURES, Table};
@@ -190,7 +189,7 @@ fn identify_recorded(
         let mut measured = measured[index].iter();
         shown.retain(|slide| {
             measured.next().is_some_and(|measured| {
-                let observed_now = Observation::from(&measured.measurement);
+                let observed_now = measured.observation();
                 slide.number == measured.number
                     && !seen.iter().flatten().any(|l| *l == observed_now)
             })

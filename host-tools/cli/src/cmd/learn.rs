@@ -121,7 +121,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         let of = |movement: &Movement| {
             let slides = measured[*texture].iter();
             let same = slides.filter(|slide| slide.movement == *movement);
-            let observed = same.map(|slide| Observation::from(&slide.measurement));
+            let observed = same.map(MeasuredSlide::observation);
             observed.take(args.train_slides).collect()
         };
         learned.movements.iter().map(of).collect()

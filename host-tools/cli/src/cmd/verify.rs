@@ -133,7 +133,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
         Ok(Made {
             number: slide.number,
             movement: slide.movement,
-            observation: Observation::from(&slide.measurement),
+            observation: slide.observation(),
         })
     });
     let sample = (sample_name, Some(left_out));

@@ -27,8 +27,9 @@ enum Beside {
 /// properties.
 pub fn best_features(slides: &Slides) -> FeatureSet {
     let has = |set: FeatureSet| {
+        let features = length(set, slides);
         let mut all = slides.iter().flatten().flatten();
-        all.all(|slide| length(set, slide) > 0 && slide.vector(set, length(set, slide)).is_some())
+        all.all(|slide| features > 0 && slide.vector(set, features).is_some())
             && beside(set, slides) == Beside::Moves
     };
     FeatureSet::ALL
@@ -37,12 +38,33 @@ pub fn best_features(slides: &Slides) -> FeatureSet {
         .unwrap_or(FeatureSet::Bands)
 }
 
-/// Number of features that a slide has of a set; 0 where it has no band.
-pub(super) fn length(set: FeatureSet, slide: &Observation) -> usize {
-    match set {
-        FeatureSet::Properties => 3,
-        _ if slide.bands.is_empty() => 0,
-        _ => set.others() + slide.bands.len(),
+/// So many degrees of freedom of the scatter within textures are needed for each feature of a set with all bands: with
+/// fewer, coarse bands are wrong less often.
+const FREEDOM: usize = 2;
+
+/// Number of features of a set that a table of these slides has; 0 where there is no band.
+pub fn length(set: FeatureSet, slides: &Slides) -> usize {
+    let Some(slide) = slides.iter().flatten().flatten().next() else {
+        return 0;
+    };
+    if set == FeatureSet::Properties {
+        return 3;
+    }
+    let [all, coarse] = slide.numbers_of_bands();
+    if all == 0 {
+        return 0;
+    }
+    let movements = slides.iter().map(Vec::len).max().unwrap_or(0);
+    let freedom = |movement: usize| -> usize {
+        let cells = slides.iter().filter_map(|texture| texture.get(movement));
+        cells.map(|cell| cell.len().saturating_sub(1)).sum()
+    };
+    let fewest = (0..movements).map(freedom).min().unwrap_or(0);
+    let features = set.others() + all;
+    if all == coarse || fewest >= FREEDOM * features {
+        features
+    } else {
+        set.others() + coarse
     }
 }
 
@@ -98,6 +120,11 @@ pub fn in_words(table: Table<'_>, slides: &Slides) -> String {
         FeatureSet::Pressure => "uses P_DC and ".to_owned(),
     };
     words += &count(bands as u64, "band");
+    let measured = slides.iter().flatten().flatten().next();
+    let measured = measured.map_or(0, |slide| slide.bands.len());
+    if bands < measured {
+        words += ", most of them two in one: few slides";
+    }
     for (other, name) in [
         (FeatureSet::Force, "traction"),
         (FeatureSet::Pressure, "P_DC"),
@@ -111,7 +138,7 @@ pub fn in_words(table: Table<'_>, slides: &Slides) -> String {
             Beside::Moves => format!("; {name} not used"),
         };
     }
-    if bands < FUSED_BANDS {
+    if measured < FUSED_BANDS {
         words += "; no higher band: not measured";
     }
     words

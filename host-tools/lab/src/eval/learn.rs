@@ -252,8 +252,9 @@ fn learn_fused(
     movements: &[Movement],
     slides: &Slides,
 ) -> Result<Vec<u8>, TableError> {
-    let first = slides.iter().flatten().flatten().next();
-    let features = length(set, first.ok_or(TableError::Empty)?);
+    let mut all = slides.iter().flatten().flatten();
+    all.next().ok_or(TableError::Empty)?;
+    let features = length(set, slides);
     // per texture and movement, the features of the slides
     let vectors = slides
         .iter()

@@ -176,7 +176,7 @@ impl Report {
                     .slides
                     .iter()
                     .filter(move |s| s.movement == movement);
-                same.map(|s| Observation::from(&s.measurement)).collect()
+                same.map(MeasuredSlide::observation).collect()
             };
             table.movements().map(of).collect()
         };

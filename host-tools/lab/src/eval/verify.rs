@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Answer, Config, Explorer, Strategy};
-use tactus_core::features::{Observation, Vector, WHITE_STEPS};
+use tactus_core::features::{Vector, WHITE_STEPS};
 use tactus_core::table::{
     Change, Contents, EncodeError, Table, Tally, TextureStats, Whitened, amend,
 };
@@ -277,7 +277,7 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     let at = |(index, movement): (u8, _)| {
         let mut known = Whitened::default();
         for slide in slides.iter().filter(|slide| slide.movement == movement) {
-            let features = Observation::from(&slide.measurement).vector(set, length.into());
+            let features = slide.observation().vector(set, length.into());
             let white = features.and_then(|features| table.whiten(index, &features));
             known.teach(&white.ok_or(PutError::NothingInCommon)?);
         }
