@@ -241,7 +241,6 @@ impl Product {
 
     /// Multiplies by a normal number.
     fn multiply(&mut self, by: f32) {
-        const { assert!(f32::MANTISSA_DIGITS == 24) };
         let bits = (self.mantissa * by).to_bits();
         self.exponent += (bits >> 23) as i32 - 127;
         self.mantissa = f32::from_bits(bits & 0x7f_ffff | 127 << 23);

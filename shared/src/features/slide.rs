@@ -77,7 +77,7 @@ pub struct Slide<'p> {
     signals: [Signal; 2],
     shear_mn: i64,
     shears: u32,
-    pdc: Pdc,
+    pub(super) pdc: Pdc,
     pace: Option<i16>,
     bands: usize,
     lost: u32,
@@ -282,7 +282,7 @@ impl<'p> Slide<'p> {
 /// P_DC during a slide: sums of it, of its products with the number of the sample and with the square of that, and of
 /// its squares.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pdc {
+pub(super) struct Pdc {
     samples: u16,
     moments: [i64; 3],
     squares: i64,
@@ -307,7 +307,7 @@ impl Pdc {
 
     /// Mean, and standard deviation about the parabola that fits best (n - 3): what a track does slowly, and a rig that
     /// settles, are no texture. `None` of fewer than four.
-    fn mean_and_sd(self) -> Option<(f32, f32)> {
+    pub(super) fn mean_and_sd(self) -> Option<(f32, f32)> {
         if self.samples < 4 {
             return None;
         }

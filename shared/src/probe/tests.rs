@@ -163,7 +163,7 @@ fn fused_table() -> vec::Vec<u8> {
         row(10.0, 0.0),
         row(20.0, 8.0),
     ];
-    fused_of(FeatureSet::Force, &[straight(13)], &rows)
+    fused_of(FeatureSet::Force, &[straight(1 + bands.len())], &rows)
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
     let (movement, slides, mean) = &episode.observed[0];
     assert_eq!((episode.observed.len(), *movement, *slides), (1, 0, 1));
     let mean = mean.iter().zip(table.white_mean(2, 0));
-    assert!(mean.clone().count() == 13 && mean.clone().all(|(a, b)| a.abs_diff(b) <= 1));
+    assert!(mean.clone().count() == 27 && mean.clone().all(|(a, b)| a.abs_diff(b) <= 1));
     // far from all
     let (episode, verdict) = explored(&[Some(-32_000), Some(-32_000)], true);
     let Event::Verdict(Verdict {

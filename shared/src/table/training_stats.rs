@@ -62,12 +62,43 @@ impl Experience {
     }
 }
 
+/// Features as they are stored: as many as there are, up to the last that is not 0.
+mod without_zeros_behind {
+    use heapless::Vec;
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+
+    use crate::features::{MAX_FEATURES, Vector};
+
+    pub(super) fn serialize<S: Serializer>(
+        mean: &[i16; MAX_FEATURES],
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        let many = mean
+            .iter()
+            .rposition(|m| *m != 0)
+            .map_or(0, |last| last + 1);
+        let there: Vector =
+            Vec::from_slice(mean.get(..many).unwrap_or_default()).unwrap_or_default();
+        there.serialize(to)
+    }
+
+    pub(super) fn deserialize<'b, D: Deserializer<'b>>(
+        from: D,
+    ) -> Result<[i16; MAX_FEATURES], D::Error> {
+        let mut mean = [0; MAX_FEATURES];
+        let there = Vector::deserialize(from)?;
+        mean.iter_mut().zip(there).for_each(|(to, m)| *to = m);
+        Ok(mean)
+    }
+}
+
 /// The data of a texture at one movement: the mean of its whitened slides, and their number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Whitened {
     /// Slides, 255 for more.
     pub slides: u8,
     /// Their mean in steps of 1/256 standard deviation; 0 beyond the features of the table.
+    #[serde(with = "without_zeros_behind")]
     pub mean: [i16; MAX_FEATURES],
 }
 

@@ -118,6 +118,10 @@ impl Judge {
         let raw = |i: usize, j: usize| match (i, j) {
             (0, 0) => (drift.traction * whitener.g[0]).powi(2),
             (0, _) | (_, 0) => 0.0,
+            // two low bands by themselves
+            (1 | 2, _) | (_, 1 | 2) if i != j => 0.0,
+            (1 | 2, _) => (0.6 * drift.bands).powi(2),
+            _ if d > 15 => drift.bands.powi(2) * (-0.25 * i.abs_diff(j) as f64).exp(),
             _ => drift.bands.powi(2) * (-0.5 * i.abs_diff(j) as f64).exp(),
         };
         let raw: Matrix = (0..d)

@@ -109,7 +109,7 @@ impl Recipe {
         let distance: f64 = all()
             .map(|(i, j)| apart[i] * inverse[i][j] * apart[j])
             .sum();
-        let farthest = d + 8.0 * (2.0 * d).sqrt();
+        let farthest = d + 2.0 * (2.0 * d).sqrt();
         -0.5 * (ln + distance.min(farthest))
     }
 
@@ -387,7 +387,7 @@ impl Recipe {
         let limit = |against, share| f64::from(self.limits.limit(against, slides, share));
         let by = |share| background - most - limit(Against::Drifted, share);
         let over = by(None);
-        let (far, fits) = (by(Some(0.0005)) > 0.0, by(Some(0.1)) <= 0.0);
+        let (far, fits) = (by(Some(0.0005)) > 0.0, by(Some(0.3)) <= 0.0);
         let new = if slides == 1 { far } else { over > 0.0 };
         let fits = if slides <= 4 { fits } else { over <= 0.0 };
         let sure = 1.0 / sum > 0.99 && fits;

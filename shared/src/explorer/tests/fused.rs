@@ -686,7 +686,7 @@ fn far_off_values_neither_overflow_nor_panic() {
     let ends = [i16::MAX, i16::MIN, 0, 1];
     let whole = |slides, mean| Whitened {
         slides,
-        mean: [mean; 14],
+        mean: [mean; 28],
     };
     let rows = [
         [whole(1, i16::MAX), whole(255, i16::MAX)],
@@ -695,10 +695,10 @@ fn far_off_values_neither_overflow_nor_panic() {
         [whole(5, 0), whole(5, 1)],
     ];
     // the steepest whitening there is: it saturates
-    let mut bytes = vec![0; 2 * 14 + 14];
-    (0..14 * 14).for_each(|_| bytes.extend(i16::MAX.to_le_bytes()));
-    let steep = Whitening::read(&bytes, 14).unwrap();
-    for whitening in [straight(14), steep] {
+    let mut bytes = vec![0; 2 * 28 + 28];
+    (0..28 * 28).for_each(|_| bytes.extend(i16::MAX.to_le_bytes()));
+    let steep = Whitening::read(&bytes, 28).unwrap();
+    for whitening in [straight(28), steep] {
         let rows: Vec<Vec<Whitened>> = rows.iter().map(|row| row.to_vec()).collect();
         let bytes = fused_of(FeatureSet::Pressure, &vec![whitening; 2], &rows);
         for x in ends {
@@ -707,7 +707,7 @@ fn far_off_values_neither_overflow_nor_panic() {
                 for n in 0..300 {
                     let slide = Observation {
                         pressure: Some([x, y]),
-                        bands: heapless::Vec::from_slice(&[x; 12]).unwrap(),
+                        bands: heapless::Vec::from_slice(&[x; 26]).unwrap(),
                         ..Observation::default()
                     };
                     let movement = (n / 3 % 2) as u8;

@@ -43,8 +43,8 @@ fn like_head(length: u16) -> SkinCare {
 }
 
 /// Lengths of records, of none, up to the end of the page, and beyond; no checksum ends with 00 or FF.
-const LENGTHS: [u16; 16] = [
-    1, 2, 4, 9, 20, 63, 65, 106, 112, 113, 300, 700, 900, 990, 1020, 9000,
+const LENGTHS: [u16; 18] = [
+    1, 2, 4, 9, 20, 63, 65, 106, 112, 113, 192, 193, 300, 700, 900, 990, 1020, 9000,
 ];
 
 fn skin(work: f32) -> SkinCare {
@@ -152,7 +152,7 @@ fn a_head_longer_than_any_record_hides_no_setting() {
         let page = &ram.bytes[PAGE..][..SECTOR - 20];
         PAGE + (page.iter().rposition(|byte| *byte != 0xFF).unwrap() + 4) / 4 * 4
     };
-    for length in LENGTHS.into_iter().filter(|n| (113..800).contains(n)) {
+    for length in LENGTHS.into_iter().filter(|n| (193..800).contains(n)) {
         let mut store = open(worn());
         let end = written(&store.flash);
         block_on(store.set_skin(&like_head(length))).unwrap();

@@ -112,11 +112,12 @@ fn when_full_records_of_another_table_are_given_up() {
 }
 
 /// The longest name and means of a training, in every place.
-fn all_training(store: &mut Chip) -> Vec<super::super::TrainingRecord> {
-    let whitened = Whitened {
+fn all_training(store: &mut Chip, features: usize) -> Vec<super::super::TrainingRecord> {
+    let mut whitened = Whitened {
         slides: 255,
-        mean: [i16::MIN; MAX_FEATURES],
+        ..Whitened::default()
     };
+    whitened.mean[..features].fill(i16::MIN);
     let records: Vec<_> = (0..MAX_RECORDS)
         .map(|n| super::super::TrainingRecord {
             name: Name::try_from(std::format!("{n:040}").as_str()).unwrap(),
@@ -137,7 +138,7 @@ fn all_training_and_all_that_was_learned_fit_into_a_page() {
     let mut store = chip();
     block_on(store.set_calibration(&calibration(1))).unwrap();
     let skin = SkinCare::after(1.0, 2.0);
-    let training_record = all_training(&mut store);
+    let training_record = all_training(&mut store, 14);
     let record = |number, size| learned_record(u32::MAX, number, 2, 13, size);
     // round after round, so that the pages turn with everything in them
     for size in [8191, -8192, 8000] {
@@ -162,7 +163,7 @@ fn all_training_and_all_that_was_learned_fit_into_a_page() {
 #[test]
 fn what_does_not_fit_is_refused_and_nothing_is_lost() {
     let mut store = chip();
-    let training_record = all_training(&mut store);
+    let training_record = all_training(&mut store, MAX_FEATURES);
     let record = |number| learned_record(u32::MAX, number, 2, 14, i16::MIN);
     let mut stored = 0;
     let why = loop {

@@ -9,7 +9,7 @@ const BANDS: FeatureSet = FeatureSet::Bands;
 /// Two textures, two movements and two features, field by field as the module's page has it: movements begin at byte
 /// 16, whitenings at 28, cells at 52, trials at 68, the lineage at 72, numbers and tallies at 76, names at 86.
 pub(super) fn small_fused() -> Vec<u8> {
-    let mut bytes = b"TACT\x01\0\x01\x02\x67\0\0\0\x02\0\x02\x02".to_vec();
+    let mut bytes = b"TACT\x01\0\x01\x06\x67\0\0\0\x02\0\x02\x02".to_vec();
     bytes.extend(b"\xee\x04\x10\x27\0\0"); // 1262 mN, 10000 um/s
     bytes.extend(b"\xc8\0\x78\xf6\0\0"); // 200 mN, 63096 um/s
     bytes.extend(by_hand());
@@ -135,7 +135,7 @@ proptest! {
 
     #[test]
     fn no_bytes_behind_a_fused_header_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300),
-        set in 0u8..4, features in 0u8..15) {
+        set in 3u8..9, features in 0u8..30) {
         let length = (16 + bytes.len() + CRC_BYTES) as u32;
         let mut begun = b"TACT\x01\0\x01".to_vec();
         begun.push(set);
@@ -154,7 +154,7 @@ fn every_check_of_a_fused_table_names_what_is_wrong() {
     let at = |at: usize, byte: u8| error(&wrong_fused(|bytes| bytes[at] = byte));
     assert_eq!(at(6, 2), TableError::Method(2));
     // no such set, features that it cannot have, and Gaussians of features
-    for (field, byte) in [(7, 4), (15, 0), (15, 13), (7, 3), (7, 1), (6, 0)] {
+    for (field, byte) in [(7, 8), (7, 3), (15, 0), (15, 27), (7, 7), (7, 5), (6, 0)] {
         assert_eq!(at(field, byte), TableError::Header, "byte {field}");
     }
     assert_eq!(at(28 + 4, 31), TableError::Whitening(0));

@@ -219,6 +219,8 @@ fn the_drift_is_diagonal_in_whitened_space() {
         let raw = |i: usize, j: usize| match (i, j) {
             (0, 0) => (0.1 * mean).powi(2),
             (0, _) | (_, 0) => 0.0,
+            (1 | 2, _) | (_, 1 | 2) if i != j => 0.0,
+            (1 | 2, _) => 0.36 * 0.09,
             _ => 0.09 * (-0.5 * i.abs_diff(j) as f64).exp(),
         };
         let bytes = whitening.as_bytes();

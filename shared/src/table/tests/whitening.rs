@@ -211,7 +211,7 @@ fn a_whitening_is_applied_as_it_is_documented() {
 
     assert_eq!(Whitening::read(&by_hand()[..13], 2), None);
     assert_eq!(Whitening::read(&by_hand(), 3), None);
-    assert_eq!(Whitening::read(&[0; 3 * 15 + 2 * 15 * 15], 15), None);
+    assert_eq!(Whitening::read(&[0; 3 * 29 + 2 * 29 * 29], 29), None);
     let mut places = by_hand();
     places[5] = 30;
     assert!(Whitening::read(&places, 2).is_some());
