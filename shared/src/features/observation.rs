@@ -126,11 +126,11 @@ impl Observation {
     }
 
     /// The same with coarse bands, made of all of [`FUSED_EDGES`](crate::dsp::FUSED_EDGES) that it has.
-    pub fn with_coarse_bands(self) -> Self {
-        Self {
-            bands: up_to(coarse(&self.bands)),
-            ..self
+    pub fn with_coarse_bands(mut self) -> Self {
+        if self.bands.len() > COARSE_BANDS {
+            self.bands = up_to(coarse(&self.bands));
         }
+        self
     }
 
     /// Numbers of bands that it can be compared by, the most first.
@@ -162,16 +162,15 @@ impl From<&Measurement> for Observation {
             .pdc
             .and_then(|(mean, sd)| Some([fixed(mean / PDC_UNIT)?, fixed(libm::logf(sd + 0.5))?]));
         let bands = slide.spectrum.fused_bands().iter().take(slide.bands);
-        let observation = Self {
+        let bands: Vec<i16, FUSED_BANDS> = up_to(bands.filter_map(|band| fixed(*band)));
+        Self {
             properties: slide.properties,
-            bands: up_to(bands.filter_map(|band| fixed(*band))),
+            bands: match bands.len() {
+                ..=COARSE_BANDS => up_to(coarse(&bands)),
+                _ => bands,
+            },
             pressure,
             pace: slide.pace,
-        };
-        if observation.bands.len() > COARSE_BANDS {
-            observation
-        } else {
-            observation.with_coarse_bands()
         }
     }
 }

@@ -53,7 +53,7 @@ pub(crate) struct Expecting {
     /// How much fingers and samples change from one session to the next, for a table that is learned with the method
     /// fused: standard deviations of band powers, ln, and of traction as a share of its mean; 0 for one session and
     /// samples that stay where they are
-    #[arg(long, value_name = "BANDS,TRACTION|0", default_value = "0.1,0.04", value_parser = drift)]
+    #[arg(long, value_name = "BANDS,TRACTION|0", default_value = "0.12,0.04", value_parser = drift)]
     pub(crate) drift: Drift,
 }
 
@@ -68,7 +68,7 @@ fn drift(text: &str) -> Result<Drift, String> {
             .map(|_| Drift::NONE),
     };
     drift.filter(|drift| drift.is_possible()).ok_or_else(|| {
-        "two numbers from 0 to 10, such as 0.1,0.04, or 0 for no drift at all".to_owned()
+        "two numbers from 0 to 10, such as 0.12,0.04, or 0 for no drift at all".to_owned()
     })
 }
 

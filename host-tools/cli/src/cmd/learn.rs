@@ -87,7 +87,12 @@ pub(crate) struct ByHand {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let folder = args.from.folder()?;
-    let (set, measured) = measure_folder(&folder)?;
+    let (set, mut measured) = measure_folder(&folder)?;
+    if !args.lengths.is_empty() {
+        // the first parts have few frames
+        let slides = measured.iter_mut().flatten();
+        slides.for_each(MeasuredSlide::with_coarse_bands);
+    }
     let features = args.features.map(Features::set);
     let expected = Expected {
         drift: Some(args.expecting.drift),
@@ -176,7 +181,9 @@ fn with_lengths(
     })?;
     let features = args.features.map(Features::set);
     let shorter = (0..).zip(&lengths_ms).map(|(n, &ms)| {
-        let of_length = of_length(&slides, n);
+        let mut of_length = of_length(&slides, n);
+        let all = of_length.iter_mut().flatten();
+        all.for_each(MeasuredSlide::with_coarse_bands);
         let movements = (0..).zip(table.movements());
         let longer = movements.filter(|(_, movement)| is_longer(&slides, *movement, n));
         let movements = longer.map(|(at, _)| 1_u64 << at).sum();

@@ -80,6 +80,11 @@ impl MeasuredSlide {
         }
     }
 
+    /// Leaves it coarse bands only.
+    pub fn with_coarse_bands(&mut self) {
+        self.given = Some(self.observation().with_coarse_bands());
+    }
+
     /// The features that textures are told apart by.
     pub fn observation(&self) -> Observation {
         let measured = || observation(&self.measurement);

@@ -1,12 +1,13 @@
 //! The basis of a fused table: which features its slides have, and which of these move.
 
 use tactus_core::features::{
-    FEATURE_STEPS, FUSED_BANDS, FeatureSet, Observation, PDC_UNIT, Property,
+    COARSE_BANDS, FEATURE_STEPS, FUSED_BANDS, FeatureSet, Observation, PDC_UNIT, Property,
 };
-use tactus_core::table::{Contents, Table};
+use tactus_core::table::{Contents, Table, encoded_len};
 
 use super::learn::Slides;
 use super::show::count;
+use crate::sim::flash::TABLE;
 
 /// Largest difference between slides of one texture at which a feature is constant, in steps: a count of P_DC, and
 /// what rounding adds. A feature that never moves measures nothing, and any change of it later would look like a new
@@ -39,18 +40,18 @@ pub fn best_features(slides: &Slides) -> FeatureSet {
 }
 
 /// So many degrees of freedom of the scatter within textures are needed for each feature of a set with all bands: with
-/// fewer, coarse bands are wrong less often.
+/// fewer, coarse bands are wrong less often. The table must fit into a probe, with its sections.
 const FREEDOM: usize = 2;
 
 /// Number of features of a set that a table of these slides has; 0 where there is no band.
 pub fn length(set: FeatureSet, slides: &Slides) -> usize {
-    let Some(slide) = slides.iter().flatten().flatten().next() else {
-        return 0;
-    };
     if set == FeatureSet::Properties {
         return 3;
     }
-    let [all, coarse] = slide.numbers_of_bands();
+    let numbers = slides.iter().flatten().flatten();
+    let numbers = numbers.map(Observation::numbers_of_bands);
+    let fewer = |[a, b]: [usize; 2], [c, d]: [usize; 2]| [a.min(c), b.min(d)];
+    let [all, coarse] = numbers.reduce(fewer).unwrap_or_default();
     if all == 0 {
         return 0;
     }
@@ -61,7 +62,9 @@ pub fn length(set: FeatureSet, slides: &Slides) -> usize {
     };
     let fewest = (0..movements).map(freedom).min().unwrap_or(0);
     let features = set.others() + all;
-    if all == coarse || fewest >= FREEDOM * features {
+    let contents = Contents::Fused(set, features as u8);
+    let fits = encoded_len(contents, slides.len(), movements, 0) <= TABLE / 8 * 7;
+    if all == coarse || fits && fewest >= FREEDOM * features {
         features
     } else {
         set.others() + coarse
@@ -106,7 +109,7 @@ fn beside(set: FeatureSet, slides: &Slides) -> Beside {
     }
 }
 
-/// The features that a table uses, and why not others of the slides that it was learned from, in words: `uses 12 bands;
+/// The features that a table uses, and why not others of the slides that it was learned from, in words: `uses 26 bands;
 /// no traction: not measured; P_DC constant: left out`.
 pub fn in_words(table: Table<'_>, slides: &Slides) -> String {
     let Contents::Fused(set, features) = table.contents() else {
@@ -121,9 +124,9 @@ pub fn in_words(table: Table<'_>, slides: &Slides) -> String {
     };
     words += &count(bands as u64, "band");
     let measured = slides.iter().flatten().flatten().next();
-    let measured = measured.map_or(0, |slide| slide.bands.len());
-    if bands < measured {
-        words += ", most of them two in one: few slides";
+    let all_measured = measured.is_none_or(|slide| slide.numbers_of_bands()[1] == COARSE_BANDS);
+    if all_measured && bands < FUSED_BANDS {
+        words += " (26 with more, and longer, slides)";
     }
     for (other, name) in [
         (FeatureSet::Force, "traction"),
@@ -138,7 +141,7 @@ pub fn in_words(table: Table<'_>, slides: &Slides) -> String {
             Beside::Moves => format!("; {name} not used"),
         };
     }
-    if measured < FUSED_BANDS {
+    if !all_measured {
         words += "; no higher band: not measured";
     }
     words
@@ -167,7 +170,7 @@ mod tests {
             };
             Observation {
                 properties: Properties::new([traction(texture, n), Some(1.0), Some(5.0)]),
-                bands: (0..12).map(&mut band).collect(),
+                bands: (0..26).map(&mut band).collect(),
                 pressure: pressure(texture, n),
                 pace: None,
             }
@@ -196,12 +199,12 @@ mod tests {
             assert!(table(&slides) == without);
             assert_eq!(
                 words(&without, &slides),
-                "uses 12 bands; traction constant: left out; P_DC constant: left out"
+                "uses 14 bands (26 with more, and longer, slides); traction constant: left out; P_DC constant: left out"
             );
         }
         assert_eq!(
             words(&without, &slides(|_, _| None, |_, _| None)),
-            "uses 12 bands; no traction: not measured; no P_DC: not measured"
+            "uses 14 bands (26 with more, and longer, slides); no traction: not measured; no P_DC: not measured"
         );
     }
 
@@ -212,12 +215,12 @@ mod tests {
         assert_eq!(best_features(&with), FeatureSet::Pressure);
         assert_eq!(
             in_words(Table::read(&table(&with)).unwrap(), &with),
-            "uses P_DC and 12 bands; traction constant: left out"
+            "uses P_DC and 14 bands (26 with more, and longer, slides); traction constant: left out"
         );
         let with = slides(moves, |_, n| Some(0.4 + 0.01 * n as f32));
         assert_eq!(
             in_words(Table::read(&table(&with)).unwrap(), &with),
-            "uses traction and 12 bands; P_DC not used"
+            "uses traction and 14 bands (26 with more, and longer, slides); P_DC not used"
         );
         // a sensor that came loose in one slide
         let with = slides(|t, n| moves(t, n).filter(|_| n != 3), |_, _| None);

@@ -161,8 +161,14 @@ pub(crate) fn learn_lengths(
     lengths_ms: &[u16],
     trials: &[Vec<Vec<ObservedTrial>>],
 ) -> Result<Vec<u8>, TableError> {
+    // the first parts have few frames
+    let all = lengths_ms.is_empty();
+    let bands = |observation: Observation| match all {
+        true => observation,
+        false => observation.with_coarse_bands(),
+    };
     let learn = |slide: &dyn Fn(&ObservedTrial) -> Observation| {
-        let of = |cell: &Vec<ObservedTrial>| cell.iter().map(slide).collect();
+        let of = |cell: &Vec<ObservedTrial>| cell.iter().map(slide).map(bands).collect();
         let slides: Vec<Vec<Vec<Observation>>> = trials
             .iter()
             .map(|row| row.iter().map(of).collect())

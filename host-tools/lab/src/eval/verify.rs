@@ -433,9 +433,7 @@ mod tests {
                     movement: at as u8,
                     property: None,
                 };
-                explorer
-                    .observe(action, &Observation::from(&slide.measurement))
-                    .unwrap();
+                explorer.observe(action, &slide.observation()).unwrap();
             }
             let accepted = false_accept(&explorer, reference).unwrap();
             assert!((0.0..0.2).contains(&accepted), "{accepted}");

@@ -50,17 +50,19 @@ fn every_set_has_its_features_in_their_order() {
 
 #[test]
 fn coarse_bands_are_those_of_whoever_has_no_more() {
-    // as of a sensor that is sampled slowly: of 13 bands there are 7 coarse ones
-    let measured = |fine: usize| Observation {
-        bands: observation().bands.into_iter().take(fine).collect(),
+    let of = |bands: usize| Observation {
+        bands: observation().bands.into_iter().take(bands).collect(),
         ..Observation::default()
     };
-    let few = measured(13).with_coarse_bands();
-    assert_eq!(few.bands, [100, 200, 350, 550, 750, 950, 1150]);
-    assert_eq!(few.vector(FeatureSet::Bands, 7).unwrap(), few.bands);
-    assert_eq!(measured(26).vector(FeatureSet::Bands, 7), None);
-    assert_eq!(measured(17).numbers_of_bands(), [17, 9]);
-    assert_eq!(few.numbers_of_bands(), [7, 7]);
+    let coarse = of(26).with_coarse_bands();
+    assert_eq!(coarse.bands[..4], [100, 200, 350, 550]);
+    assert_eq!(coarse.clone().with_coarse_bands(), coarse);
+    assert_eq!(coarse.vector(FeatureSet::Bands, 14).unwrap(), coarse.bands);
+    assert_eq!(of(26).vector(FeatureSet::Bands, 9), None);
+    // as of a sensor that is sampled slowly: of 17 bands there are 9 coarse ones
+    assert_eq!(of(17).numbers_of_bands(), [17, 9]);
+    assert_eq!(of(17).vector(FeatureSet::Bands, 9).unwrap().len(), 9);
+    assert_eq!(coarse.numbers_of_bands(), [14, 14]);
 }
 
 #[test]
