@@ -5,7 +5,7 @@ usage: peers.py DATA [SET ...]
 
 DATA holds `biotac`, `fabricslide` and `boreal` (see DATA.md of the repository); without SET all that are there are
 used. It needs the package tactus and scikit-learn 1.6 or newer. Ours is the table of `tactus learn`, with the drift that
-it expects as delivered and with none. All methods get the features that this table uses: 12 band powers, and P_DC or
+it expects as delivered and with none. All methods get the features that a table may use: 26 band powers, and P_DC or
 traction where there is one.
 
 Splits, of which the first three are those of `tactus evaluate`: `interleaved` draws the slides to learn from out of

@@ -36,5 +36,5 @@ pub(crate) fn main() {
         println!("{:<10} {:.3}", property.name(), value.unwrap());
     }
     let bands = features.spectrum.fused_bands();
-    println!("ln of twelve band powers {bands:.1?}");
+    println!("mean ln of 26 band powers {bands:.1?}");
 }

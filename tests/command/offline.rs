@@ -180,7 +180,7 @@ fn features_prints_the_golden_columns() {
     let at = Scratch::new().with("BIOTAC", folder.to_str().unwrap());
     let ours = at.printed("features --recordings BIOTAC --format csv");
     let golden = fs::read_to_string(folder.join("features.csv")).unwrap();
-    let bands: String = (0..12).map(|n| format!(",ln_fused_band{n}")).collect();
+    let bands: String = (0..26).map(|n| format!(",ln_fused_band{n}")).collect();
     let properties = "material,slide,traction_n,roughness_ln,fineness_unfiltered_ln";
     let header =
         format!("{properties}{bands},pdc_mean,pdc_sd,session,run,name,force_n,speed_mm_s,trial");

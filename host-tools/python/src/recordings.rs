@@ -296,8 +296,8 @@ impl Recordings {
     ///
     /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it cannot be measured),
     /// roughness_ln, fineness_unfiltered_ln (float32), roughness_is_bound (bool), each of shape (slides,); ln_psd_bands
-    /// of shape (slides, 8) and ln_fused_bands of shape (slides, 12), float32; pdc of shape (slides, 2), mean and
-    /// standard deviation of P_DC, NaN where it was not measured; session and run (str). See `Features` for units.
+    /// of shape (slides, 8) and ln_fused_bands of shape (slides, 26), float32; pdc of shape (slides, 2), mean and
+    /// standard deviation of P_DC (about the parabola that fits best), NaN where it was not measured; session and run (str). See `Features` for units.
     /// Slides are read and measured once, on all cores.
     ///
     /// Raises RecordingError where a file cannot be read, or a slide has no features; KeyboardInterrupt after Ctrl-C.
@@ -327,7 +327,9 @@ impl Recordings {
         };
         let bounds = all.iter().map(|s| s.measurement.roughness_is_bound);
         let bands = all.iter().flat_map(|s| s.measurement.ln_bands()).collect();
-        let fused = all.iter().flat_map(|s| *s.measurement.spectrum.fused_bands());
+        let fused = all
+            .iter()
+            .flat_map(|s| *s.measurement.spectrum.fused_bands());
         let columns = PyDict::new(py);
         columns.set_item("material", array(py, material))?;
         columns.set_item("name", py.import("numpy")?.call_method1("array", (names,))?)?;

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use tactus_core::explorer::{Config, Method};
 use tactus_core::features::{
-    COARSE_BANDS, FEATURE_STEPS, Movement, Observation, PropertySet, fixed,
+    COARSE_BANDS, FEATURE_STEPS, FUSED_BANDS, Movement, Observation, PropertySet, fixed,
 };
 use tactus_core::table::{Action, Table as Read};
 use tactus_lab::data::replay::MeasuredSlide;
@@ -39,10 +39,10 @@ pub(crate) fn observations(given: &Bound<'_, PyAny>) -> PyResult<Vec<Observation
             return Err(PyValueError::new_err(say));
         }
     };
-    if !(1..=COARSE_BANDS).contains(&features) {
+    if !(1..=COARSE_BANDS).contains(&features) && features != FUSED_BANDS {
         return Err(PyValueError::new_err(format!(
-            "{features} features, and a table has 1 to {COARSE_BANDS} of them: choose the best, or reduce them first, \
-             as by sklearn.decomposition.PCA({COARSE_BANDS})"
+            "{features} features, and a table has 1 to {COARSE_BANDS} of them, or the {FUSED_BANDS} of ln_fused_bands: \
+             choose the best, or reduce them first, as by sklearn.decomposition.PCA({COARSE_BANDS})"
         )));
     }
     if let Some(value) = values

@@ -42,13 +42,13 @@ def test_features_are_those_of_numpy(whose, request):
     for texture in recordings.textures:
         for slide in recordings.slides(texture):
             ours = slide.features()
-            traction, roughness, fineness, eight, twelve = of_numpy(slide)
+            traction, roughness, fineness, eight, fused = of_numpy(slide)
             assert ours.traction_n == pytest.approx(traction, abs=1e-5)
             # coefficients on the chip have 15 bits
             assert ours.roughness_ln == pytest.approx(roughness, abs=5e-3)
             assert ours.fineness_unfiltered_ln == pytest.approx(fineness, abs=1e-3)
             np.testing.assert_allclose(ours.ln_psd_bands, eight, atol=5e-3)
-            np.testing.assert_allclose(ours.ln_fused_bands, twelve, atol=5e-3)
+            np.testing.assert_allclose(ours.ln_fused_bands, fused, atol=5e-3)
 
 
 def test_samples_of_ones_own_have_the_features_of_the_recording(small, biotac):

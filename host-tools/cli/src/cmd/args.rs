@@ -118,9 +118,9 @@ fn probability(text: &str) -> Result<f32, String> {
 /// What a fused table is learned from.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Features {
-    /// Traction and twelve band powers
+    /// Traction, and the logarithms of band powers
     Force,
-    /// Mean and standard deviation of P_DC, and the band powers: for a rig without force sensing
+    /// Mean of P_DC, logarithm of its scatter, and the band powers: for a rig without force sensing
     Pressure,
     /// The band powers alone
     Bands,

@@ -164,7 +164,7 @@ fn text<'s>(
 ) -> anyhow::Result<()> {
     writeln!(
         out,
-        "no. {:<24} slide  {:<20} traction N  roughness   fineness  P_DC mean, scatter  ln of twelve bands",
+        "no. {:<24} slide  {:<20} traction N  roughness   fineness  P_DC mean, scatter  ln of 26 bands",
         "texture", "movement"
     )?;
     for row in rows {
