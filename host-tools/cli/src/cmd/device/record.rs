@@ -68,7 +68,8 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "tactus device record {} --slides {slides}",
         textures.join(" ")
     );
-    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let mut writer = writer.by_hand();
     let (mut bench, status) = Bench::open(&args.at, Format::Text)?;
     writer.label(Labels {
         lot: args.lot.trim().to_owned(),
