@@ -201,13 +201,9 @@ impl Recordings {
     fn write(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         let (set, found) = (Arc::clone(&self.set), self.found.clone());
         work(py, move |between| {
-            let written = copy(&set, &folder, &mut |_, _| between());
-            written.map_err(|why| why.raise())?;
-            match found {
-                Some(found) => std::fs::write(folder.join(SETTINGS), found.settings.template()),
-                None => Ok(()),
-            }
-            .map_err(PyErr::from)
+            let settings = found.as_ref().map(|found| &found.settings);
+            let written = copy(&set, &folder, settings, &mut |_, _| between());
+            written.map(drop).map_err(|why| why.raise())
         })
     }
 
