@@ -13,8 +13,8 @@ const STOPPING_S: f64 = 0.1;
 const WINDOW: usize = 32;
 /// Most windows that are compared in each second of a slide.
 const PER_SECOND: f64 = 64.0;
-/// Fewest different windows of a slide whose parts are compared. One that is shorter, or that is a pure tone, is
-/// compared as a whole.
+/// Fewest different windows of a slide whose parts are compared. One that is shorter, or repeats itself as a pure tone
+/// does, is compared as a whole.
 const FEWEST: usize = 16;
 /// Share of a slide's windows, one in so many, that may be those of others.
 const SHARED: usize = 3;
@@ -104,8 +104,9 @@ impl Fingerprint {
             }
         }
         hashes.sort_unstable();
+        let all = hashes.len();
         hashes.dedup();
-        if hashes.len() < FEWEST {
+        if hashes.len() < FEWEST || hashes.len() * 4 < all * 3 {
             hashes = vec![(whole >> 32) as u32];
         }
         Self(hashes)
