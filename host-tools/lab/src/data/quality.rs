@@ -123,8 +123,8 @@ fn mixed(x: u64) -> u64 {
 /// A slide whose samples are those of another, shifted or not.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error(
-    "{percent} % of its P_AC is that of {other}, sample for sample: a copy, one recording cut twice, or a recorder that \
-     repeats itself"
+    "{percent} % of its P_AC is that of {other}, sample for sample: a copy, one recording cut twice, or a recorder \
+     that repeats itself"
 )]
 pub(crate) struct Copied {
     percent: usize,
