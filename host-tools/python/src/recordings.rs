@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
 use tactus_lab::data::import::copy;
-use tactus_lab::data::import::settings::{SETTINGS, Settings};
+use tactus_lab::data::import::settings::Settings;
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::recordings::{Held, RecordingSet};
 use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all, trials};
