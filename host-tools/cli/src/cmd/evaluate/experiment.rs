@@ -25,9 +25,9 @@ probable than --threshold, or after --max-slides.
 
 First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none
 of those I know\", \"most like\" a name where the table would be sure of a wrong one for too many new textures, or
-\"not sure\", which is undecided. There the texture may be none of the known ones, no slide
-comes twice, and the exploration ends when the recordings run out. Then come the figures of explorations in which it
-must be one of the known ones and slides are drawn with replacement, as in the paper.
+\"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
+exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the
+known ones and slides are drawn with replacement, as in the paper.
 
 With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is
 train or validate, and an action is any (movement, property) pair.
