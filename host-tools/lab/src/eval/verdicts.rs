@@ -74,6 +74,7 @@ mod tests {
             (VerdictKind::New, false),
             (VerdictKind::Undecided, true),
             (VerdictKind::Changed, true),
+            (VerdictKind::Changed, false),
             (VerdictKind::MostLike, true),
             (VerdictKind::MostLike, false),
         ];
