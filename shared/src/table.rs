@@ -57,6 +57,12 @@
 //! | | as the table itself, learned from slides of this length: header to trials, a trial of 0 where a movement's slides are not longer |
 //! | | the contents of section 1 and of section 2, where the table has these |
 //!
+//! Section 7, of a fused table, is what it did on textures that were left out of it, and on slides that it was not
+//! learned from (`OpenSet`): three shares, of known textures flagged, new ones noticed, and new ones told with a wrong
+//! name; of each the share, and the ends of the interval in which it lies with a probability of 95 % (f32). Where the
+//! last is above 0.1, no name is told as sure unless the user says that nothing new can come. Without the section a
+//! table tells names as sure.
+//!
 //! Section 8, of either kind of table, is for a computer that tests the table with recordings, and leaves out the
 //! slides that it was learned from: 1 if these are all, 0 if there are others (1); then of each the first bytes of the
 //! SHA-256 of its P_AC, as little-endian numbers of 16 bits (6), in rising order. Hosts take the section out before
@@ -73,6 +79,7 @@ mod lengths;
 mod limits;
 mod matrix;
 mod name;
+mod open_set;
 mod patch;
 mod population;
 mod samples;
@@ -98,6 +105,7 @@ pub use lengths::{MAX_LENGTHS, Shorter, with_lengths};
 pub(crate) use limits::Numbers;
 pub use limits::{Against, EPISODES, FALSE_ALARM, Limits, Tail, is_false_alarm};
 pub use name::{MAX_NAME, Name, NameError, is_printable, valid_name};
+pub use open_set::{MOST_NAMED, OpenSet, Share, with_open_set};
 pub use patch::{recentre, retell};
 pub use population::{POPULATION, Population};
 pub use samples::with_moved;

@@ -355,7 +355,7 @@ fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
     let textures = array(&object["textures"]);
     assert_eq!(textures.len(), 6);
     let verdicts = &object["recorded"]["known"];
-    let shares = ["right", "new", "wrong", "undecided"];
+    let shares = ["right", "new", "wrong", "most_like", "undecided"];
     let sum: f64 = shares.iter().map(|name| number(&verdicts[name])).sum();
     assert!((sum - 1.0).abs() < 1e-9, "{verdicts}");
     // of three slides two were learned from: every exploration has three slides at most, one a movement

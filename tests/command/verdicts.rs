@@ -5,13 +5,14 @@ use tactus_tests::{count, data};
 use crate::{Scratch, array};
 
 /// Names of the verdicts.
-const VERDICTS: [&str; 4] = ["right", "new", "wrong", "undecided"];
+const VERDICTS: [&str; 5] = ["right", "new", "wrong", "most_like", "undecided"];
 
 /// The verdict that `identify` printed, by its place in [`VERDICTS`].
 fn told(shown: &str) -> usize {
     let name = match shown.lines().rev().find(|line| line.contains(" after ")) {
         Some(line) if line.starts_with("It is not one of") => "new",
         Some(line) if line.starts_with("Not sure") => "undecided",
+        Some(line) if line.starts_with("It is most like") => "most_like",
         Some(line) if line.starts_with("It is ") && shown.contains("\nRight.") => "right",
         Some(line) if line.starts_with("It is ") && shown.contains("\nWrong:") => "wrong",
         _ => panic!("{shown}"),
@@ -32,7 +33,7 @@ fn compare(at: &Scratch, train_slides: u32, method: &str, more: &str, times: u64
     let learn =
         format!("learn --recordings FOLDER --train-slides {train_slides} --method {method}");
     at.printed(&format!("{learn} --out table"));
-    let (mut counts, mut runs) = ([0.0; 4], 0.0);
+    let (mut counts, mut runs) = ([0.0; 5], 0.0);
     for material in materials {
         for _ in 0..times {
             runs += 1.0;
@@ -65,6 +66,48 @@ fn compare(at: &Scratch, train_slides: u32, method: &str, more: &str, times: u64
         let is_near = (found - share).abs() <= error.max(4.0 / runs);
         assert!(is_near, "{verdict}: {found}, evaluate has {share}");
     }
+}
+
+/// A table that expects so much drift that it would call most new textures by a name says "most like" in its place.
+#[test]
+fn a_name_that_too_many_new_textures_would_get_is_most_like() {
+    let at = Scratch::new();
+    let named = |drift: &str| {
+        let learn =
+            format!("learn --recordings SIMULATED --train-slides 2 --drift {drift} --force");
+        let said = at.printed(&format!("{learn} --out table"));
+        let table = at.json("table table", 0);
+        let share = table["open_set"]["new_named"]["share"].as_f64().unwrap();
+        (share, said.contains("so it says \"most like X\""))
+    };
+    let identify = "identify --recordings SIMULATED --table table --material Corduroy";
+    let (share, is_said) = named("2,1");
+    assert!(share > 0.1 && is_said, "{share}");
+    let found = at.json(identify, 3);
+    assert_eq!(found["verdict"]["told"], "most-like");
+    assert_eq!(found["verdict"]["texture"], "Corduroy");
+    assert!(found["right"].is_null(), "{found}");
+    assert!(
+        at.printed(identify)
+            .contains("\nIt is most like Corduroy: ")
+    );
+    let found = at.json(&format!("{identify} --closed"), 0);
+    assert_eq!(found["verdict"]["told"], "sure");
+    let report = at.printed("report table");
+    assert!(report.contains("so it says \"most like X\""), "{report}");
+    // with figures of its own it is the same in the sums: a group for itself, nothing in it with --closed
+    let evaluate = "evaluate --recordings SIMULATED --train-slides 2 --drift 2,1 --runs 60";
+    let told = at.json(evaluate, 0)["verdicts"].clone();
+    assert!(told["most_like"].as_f64() > Some(0.5), "{told}");
+    assert!(told["most_like_right"].as_f64() > Some(0.5), "{told}");
+    assert_eq!((&told["right"], &told["wrong"]), (&0.0.into(), &0.0.into()));
+    let told = at.json(&format!("{evaluate} --closed"), 0)["verdicts"].clone();
+    assert!(told["right"].as_f64() > Some(0.5), "{told}");
+    assert_eq!(told["most_like"], 0.0);
+    // and one that would seldom be wrong says the name
+    let (share, is_said) = named("0,0");
+    assert!(share <= 0.1 && !is_said, "{share}");
+    assert_eq!(at.json(identify, 0)["verdict"]["told"], "sure");
 }
 
 #[test]

@@ -13,6 +13,7 @@ pub mod gauge;
 pub mod learn;
 pub mod learned;
 pub mod novelty;
+pub mod open_set;
 mod pace;
 pub mod places;
 pub mod refresh;

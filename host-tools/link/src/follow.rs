@@ -224,6 +224,7 @@ impl<'t> Follower<'t> {
         let wants_label = whole.is_some() && is_fused && !self.explorer.is_certain();
         let same = here.texture == there.texture
             && here.sure == there.sure
+            && here.most_like == there.most_like
             && here.unknown == there.unknown
             && self.explorer.slides() == there.slides
             && wants_label == there.wants_label;

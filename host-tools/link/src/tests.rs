@@ -169,6 +169,7 @@ impl Probe {
                     slides: 3,
                     wants_label: false,
                     changed: false,
+                    most_like: false,
                 }),
                 Event::TextureLearned(TextureLearned {
                     name: Name::try_from("velcro").unwrap(),
@@ -475,6 +476,7 @@ fn verdict(change: impl FnOnce(&mut Verdict)) -> Event {
         slides: 3,
         wants_label: false,
         changed: false,
+        most_like: false,
     };
     change(&mut verdict);
     Event::Verdict(verdict)

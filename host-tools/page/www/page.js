@@ -87,7 +87,7 @@
     Places.know(known);
     choices();
     Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
-    at("figures").textContent = `The table: ${known.textures.length} textures, ${(known.bytes / 1024).toFixed(0)} KB, checksum ${known.crc.toString(16).padStart(8, "0")}.`;
+    at("figures").textContent = `The table: ${known.textures.length} textures, ${(known.bytes / 1024).toFixed(0)} KB, checksum ${known.crc.toString(16).padStart(8, "0")}. ${known.figures ?? ""}`;
   }
 
   function choices() {
@@ -299,6 +299,7 @@
     if (one.told === "sure") headline(["It is ", name, `, ${sure(one.probability)} sure ${of}.`], "sure");
     if (one.told === "changed") headline(["It is ", name, `, but not as I learned it: ${sure(one.probability)} sure ${of}.`], "changed");
     if (one.told === "new") headline([`This is none of those I know, ${of}.`], "new");
+    if (one.told === "most-like") headline(["It is most like ", name, `, ${Mind.percent(one.probability)} among those I know ${of}.`]);
     if (one.told === "undecided") headline(["Not sure; most likely ", name, `, ${Mind.percent(one.probability)} ${of}.`]);
     if (source !== "sim") {
       at("truth").textContent = "";
@@ -308,7 +309,7 @@
     const truth = nameOf(asked.number);
     const taught = known.numbers[one.index] === null ? one.texture : null;
     const right = one.told === "new" ? !isKnown(asked.number) && !lessons.has(asked.number) : one.texture === truth || taught !== null && lessons.get(asked.number) === taught;
-    const judged = one.told === "undecided" ? "" : right ? " Right." : " That is wrong.";
+    const judged = ["undecided", "most-like"].includes(one.told) ? "" : right ? " Right." : " That is wrong.";
     at("truth").textContent = `Under the finger: ${truth}.${judged}`;
     if (one.wants_label) {
       at("teach").hidden = false;

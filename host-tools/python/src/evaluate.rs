@@ -70,6 +70,7 @@ fn evaluate<'py>(
         runs,
         seed,
         config,
+        closed: false,
         with_courses: true,
     };
     let figures = work_on_all_cores(py, move |between| {

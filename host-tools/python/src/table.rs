@@ -13,8 +13,9 @@ use tactus_lab::data::recordings::files::open;
 use tactus_lab::data::table_file::{TableFileError, read_table};
 use tactus_lab::data::whole::write_whole;
 use tactus_lab::eval::evaluate::Method;
-use tactus_lab::eval::first::{FirstError, learn_first};
+use tactus_lab::eval::first::{FirstError, learn_first, taught};
 use tactus_lab::eval::learn::{Expected, learn_for};
+use tactus_lab::eval::open_set::{all_learned, with_figures};
 use tactus_lab::eval::table_summary::TableSummary;
 
 use crate::arguments;
@@ -92,21 +93,18 @@ impl Table {
             let (names, observed) = rows::to_learn(recordings, labels, most)?;
             return Self::of(work_on_all_cores(py, move |_| {
                 let movements = [rows::MOVEMENT];
-                learn_for(
-                    &expected,
-                    method.method(),
-                    features,
-                    &names,
-                    &movements,
-                    &observed,
-                )
+                let method = method.method();
+                let bytes = learn_for(&expected, method, features, &names, &movements, &observed)?;
+                with_figures(bytes, &expected, &all_learned(&observed), || ())
             })?);
         };
         let recordings = recordings.get();
         let train_slides = train_slides.unwrap_or(5);
         let (set, measured) = (Arc::clone(&recordings.set), recordings.measured(py)?);
         Self::of(work_on_all_cores(py, move |_| {
-            learn_first(&set, &measured, train_slides, method, features, &expected)
+            let bytes = learn_first(&set, &measured, train_slides, method, features, &expected)?;
+            let taught = taught(&set, &measured, train_slides)?;
+            Ok::<_, FirstError>(with_figures(bytes, &expected, &taught, || ())?)
         })?)
     }
 
@@ -151,7 +149,8 @@ impl Table {
             observed.push(row);
         }
         Self::of(work_on_all_cores(py, move |_| {
-            learn_for(&expected, method, features, &names, &movements, &observed)
+            let bytes = learn_for(&expected, method, features, &names, &movements, &observed)?;
+            with_figures(bytes, &expected, &all_learned(&observed), || ())
         })?)
     }
 

@@ -50,6 +50,9 @@ pub struct Verdict {
     pub probability: f32,
     /// Whether that exceeds the threshold, and the slides fit the texture.
     pub sure: bool,
+    /// Whether it would be sure, but the table's [`OpenSet`](crate::table::OpenSet) says that a new texture would too
+    /// often be called so.
+    pub most_like: bool,
     /// Whether it is rather none of them.
     pub unknown: bool,
     /// Whether it is sure, but not as it was learned: worn, drifted, or something much like it.
@@ -68,6 +71,8 @@ pub enum VerdictKind {
     Changed,
     /// "It is none of those I know."
     New,
+    /// "It is most like this texture": the name, not told as sure, for a new texture would too often get one.
+    MostLike,
     /// "Not sure; most likely this one": no answer, whatever the name.
     Undecided,
 }
@@ -79,6 +84,9 @@ impl Verdict {
             Self { unknown: true, .. } => VerdictKind::New,
             Self { changed: true, .. } => VerdictKind::Changed,
             Self { sure: true, .. } => VerdictKind::Sure,
+            Self {
+                most_like: true, ..
+            } => VerdictKind::MostLike,
             _ => VerdictKind::Undecided,
         }
     }
@@ -193,7 +201,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
     /// There is none before the first slide, however few the candidates.
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
-        let sure = best.sure && self.slides > 0;
+        let sure = (best.sure || best.most_like) && self.slides > 0;
         let enough = self.limits.is_some() || self.slides >= UNKNOWN_SLIDES;
         let unknown = best.unknown && enough;
         (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
@@ -231,6 +239,11 @@ impl<'t, const N: usize> Explorer<'t, N> {
     fn above(&self, limits: &Limits, share: f32) -> f32 {
         let at = |share| self.limit(limits, Against::Drifted, self.slides, share);
         at(Some(share)) - at(self.config.false_alarm)
+    }
+
+    /// Whether no name is told as sure: new textures would too often get one, and may come.
+    pub fn is_guarded(&self) -> bool {
+        self.config.open && self.table.open_set().is_some_and(|of| !of.may_name())
     }
 
     fn is_calibrated(&self) -> bool {
@@ -311,7 +324,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         } else {
             self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN)
         };
-        known && self.best().probability > self.config.threshold
+        known && !self.is_guarded() && self.best().probability > self.config.threshold
     }
 
     /// The movements made, with the number of slides and their whitened mean: what a fused table can learn from this
@@ -345,6 +358,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
             texture: 0,
             probability: 0.0,
             sure: false,
+            most_like: false,
             unknown: self.config.open && self.is_unknown(),
             changed: false,
             log_odds: self.log_odds,
@@ -360,6 +374,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
                 };
             }
         }
+        best.most_like = best.sure && self.is_guarded();
+        best.sure &= !best.most_like;
         best.changed = self.config.open && best.sure && self.is_changed();
         best
     }

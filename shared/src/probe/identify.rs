@@ -150,6 +150,7 @@ fn told(table: Table<'_>, verdict: &explorer::Verdict, slides: u8, wants_label: 
         slides,
         wants_label,
         changed: verdict.changed,
+        most_like: verdict.most_like,
     })
 }
 

@@ -7,6 +7,7 @@ use super::encode::{EncodeError, Writer};
 use super::finger::is_finger;
 use super::format::{DRIFT, MAX_MOVEMENTS, SLOPES, TWO, TableError, array, each};
 use super::limits::{Limits, Numbers};
+use super::open_set::OpenSet;
 use super::population::{LEAST, Population};
 use super::slopes::{self, Slopes};
 use super::view::Table;
@@ -16,6 +17,7 @@ use crate::features::MAX_FEATURES;
 pub(super) const NOVELTY: u16 = 2;
 pub(super) const SAMPLES: u16 = 3;
 pub(super) const FINGER: u16 = 5;
+pub(super) const OPEN_SET: u16 = 7;
 pub(super) const LEARNED: u16 = 8;
 /// Most sections, of unknown kinds as well: whoever looks for one passes the others.
 const MAX_SECTIONS: usize = 32;
@@ -142,6 +144,7 @@ impl<'a> Table<'a> {
                 NOVELTY => are_limits(contents, features, movements),
                 SLOPES => slopes::are_slopes(contents, features, self.textures.into(), movements),
                 FINGER => is_finger(contents),
+                OPEN_SET => OpenSet::read(contents).is_some(),
                 _ => continue,
             };
             let bit = 1 << kind;

@@ -6,6 +6,7 @@ mod hostile;
 mod learned;
 mod learning;
 mod lengths;
+mod open_set;
 mod samples;
 mod sections;
 pub(crate) mod slopes;

@@ -344,6 +344,8 @@ pub struct Verdict {
     pub wants_label: bool,
     /// Whether it is sure, but the texture is not as it was learned.
     pub changed: bool,
+    /// Whether it would be sure, but the table is sure of a wrong name for too many new textures.
+    pub most_like: bool,
 }
 
 impl From<&Verdict> for explorer::Verdict {
@@ -352,6 +354,7 @@ impl From<&Verdict> for explorer::Verdict {
             texture: told.texture,
             probability: told.probability,
             sure: told.sure,
+            most_like: told.most_like,
             unknown: told.unknown,
             changed: told.changed,
             log_odds: told.log_odds,

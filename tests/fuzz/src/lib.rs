@@ -200,6 +200,8 @@ fn look_at(table: &Table<'_>) {
         }
         table.tally(texture);
     }
+    let figures = table.open_set();
+    assert!(figures.is_none_or(|of| (0.0..=1.0).contains(&of.new_named.share)));
     let learned = table.learned_slides();
     assert!(learned.hashes.iter().all(|hash| learned.has(hash)));
 }

@@ -6,6 +6,7 @@ use anyhow::ensure;
 use clap::ValueEnum as _;
 use tactus_core::explorer;
 use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
+use tactus_lab::eval::open_set;
 use tactus_lab::eval::show::count;
 use tactus_study::pictures::evaluation::confusion;
 
@@ -40,6 +41,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         runs: args.runs(),
         seed: args.seed,
         config,
+        closed: args.closed,
         with_courses,
     };
     let names = experiment.names.clone();
@@ -74,6 +76,9 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     )?;
     for note in &e.notes {
         writeln!(out, "{note}")?;
+    }
+    if let Some(figures) = &e.open_set {
+        writeln!(out, "Its own figures: {}", open_set::in_words(figures))?;
     }
     let row = |name: &str, value| format!("  {name:<26} {value}");
     let share = |share: f64| format!("{:5.1} %", share * 100.0);

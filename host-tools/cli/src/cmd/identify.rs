@@ -87,6 +87,9 @@ pub(crate) struct Args {
     method: Option<Method>,
     #[command(flatten)]
     expecting: Expecting,
+    /// It is one of the textures known: never answer that it is none, and tell names as sure
+    #[arg(long)]
+    closed: bool,
     #[command(flatten)]
     stop: Stop,
     /// Another seed draws other slides; with --simulated also another world, and another texture unless one is given
@@ -280,7 +283,7 @@ where
     let best = Method::of(explorer::Method::of(table.contents()));
     let method = args.method.unwrap_or(best);
     let config = Config {
-        open: true,
+        open: !args.closed,
         ..args.stop.config(method)
     };
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;

@@ -4,15 +4,16 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail, ensure};
-use tactus_core::features::{Movement, Observation};
+use tactus_core::features::Movement;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{FALSE_ALARM, MAX_LEARNED, Table};
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{CutSlide, MeasuredSlide, measure_cut};
 use tactus_lab::eval::basis;
 use tactus_lab::eval::evaluate::Method;
-use tactus_lab::eval::first::{learn_first, learned_textures};
+use tactus_lab::eval::first::{learn_first, learned_textures, taught};
 use tactus_lab::eval::learn::{Expected, know_lengths};
+use tactus_lab::eval::open_set;
 use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::texture_name;
 
@@ -108,6 +109,11 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     )
     .with_context(|| folder.display().to_string())?;
     let bytes = with_lengths(args, &set, bytes, &expected)?;
+    let taught = taught(&set, &measured, args.train_slides)?;
+    let tables = open_set::tables(&taught) as u64;
+    let bytes = with_progress(tables, "leaving textures out", |done| {
+        open_set::with_figures(bytes, &expected, &taught, done)
+    })?;
     write_file(&args.out, &bytes, args.force)?;
     let out = &mut beside(&args.out, out);
     let learned = learned_textures(&set, &measured)?;
@@ -122,17 +128,17 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     for note in &learned.notes {
         writeln!(out, "{note}")?;
     }
-    let observed = learned.textures.iter().map(|texture| {
-        let of = |movement: &Movement| {
-            let slides = measured[*texture].iter();
-            let same = slides.filter(|slide| slide.movement == *movement);
-            let observed = same.map(MeasuredSlide::observation);
-            observed.take(args.train_slides).collect()
-        };
-        learned.movements.iter().map(of).collect()
-    });
-    let observed: Vec<Vec<Vec<Observation>>> = observed.collect();
+    let observed = taught
+        .iter()
+        .map(|row| open_set::select(row, |s| s.learned));
+    let observed: Vec<_> = observed.collect();
     writeln!(out, "{}", basis::in_words(Table::read(&bytes)?, &observed))?;
+    if let Some(figures) = Table::read(&bytes)?.open_set() {
+        writeln!(out, "{}", open_set::in_words(&figures))?;
+        if let Some(missing) = open_set::not_known(&taught) {
+            writeln!(out, "{missing}")?;
+        }
+    }
     let fewest = |texture: &usize| {
         let of = |movement: &Movement| {
             let slides = measured[*texture].iter();

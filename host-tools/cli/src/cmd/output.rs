@@ -48,12 +48,17 @@ pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyh
 }
 
 /// Verdicts by name, as people read them.
-pub(crate) fn verdict_rows(v: &Verdicts) -> [(&'static str, f64); 5] {
-    [
+pub(crate) fn verdict_rows(v: &Verdicts) -> Vec<(&'static str, f64)> {
+    let mut rows = vec![
         ("right", v.right),
         ("none of those known", v.new),
         ("wrong", v.wrong),
         ("undecided", v.undecided),
         ("told to have changed", v.changed),
-    ]
+    ];
+    if v.most_like > 0.0 {
+        rows.push(("told as most like", v.most_like));
+        rows.push(("  the right one of these", v.most_like_right / v.most_like));
+    }
+    rows
 }

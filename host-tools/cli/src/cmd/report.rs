@@ -10,6 +10,7 @@ use serde::Serialize;
 use tactus_core::table::Table;
 use tactus_lab::data::replay::MeasuredSlide;
 use tactus_lab::eval::learned::LeftOut;
+use tactus_lab::eval::open_set;
 use tactus_lab::eval::report::{RUNS, Report, Slides};
 use tactus_lab::eval::samples;
 use tactus_lab::eval::show::count;
@@ -65,6 +66,8 @@ struct Page<'r> {
     version: &'static str,
     command: String,
     report: &'r Report,
+    /// Its own figures in a sentence.
+    figures: Option<String>,
     map: String,
 }
 
@@ -105,6 +108,7 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
             version: env!("CARGO_PKG_VERSION"),
             command: command(file, args),
             report: &report,
+            figures: report.table.open_set.as_ref().map(open_set::in_words),
             map: map::figure(table)?.svg,
         };
         let page = render(include_str!("report/page.html"), &page)?;
@@ -173,6 +177,9 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
         )?;
     }
     writeln!(out, "{samples}")?;
+    if let Some(figures) = &report.table.open_set {
+        writeln!(out, "{}", open_set::in_words(figures))?;
+    }
     if let Some(recorded) = &report.recorded {
         let explorations = count(recorded.explorations as u64, "exploration");
         writeln!(
@@ -189,10 +196,11 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
             ("others", unknown),
         ];
         for (kind, verdicts) in of.into_iter().filter_map(|(k, v)| Some((k, v?))) {
-            let told = verdict_rows(verdicts).map(|(name, share)| {
+            let told = verdict_rows(verdicts).into_iter().map(|(name, share)| {
                 let share = percent((1000.0 * share).round() / 1000.0);
-                format!("{name} {share}")
+                format!("{} {share}", name.trim())
             });
+            let told: Vec<String> = told.collect();
             writeln!(out, "  {kind}: {}", told.join(", "))?;
         }
     }

@@ -18,6 +18,8 @@ pub(crate) struct Belief {
     is_new: bool,
     /// True if it differs from the texture as it was learned.
     is_changed: bool,
+    /// True if no name is told as sure.
+    is_guarded: bool,
 }
 
 /// A run without a threshold: the belief after each of its slides.
@@ -37,6 +39,7 @@ impl Course {
         let at = over.unwrap_or(self.beliefs.len().saturating_sub(1));
         let last = self.beliefs.get(at);
         let told = match last {
+            Some(b) if over.is_some() && b.is_guarded => VerdictKind::MostLike,
             Some(b) if over.is_some() && b.is_changed => VerdictKind::Changed,
             Some(_) if over.is_some() => VerdictKind::Sure,
             Some(b) if b.is_new => VerdictKind::New,
@@ -71,6 +74,7 @@ pub fn courses(
                 probability: best.probability,
                 fits: !config.open || explorer.fits(),
                 is_new: best.unknown,
+                is_guarded: explorer.is_guarded(),
                 is_changed: config.open && explorer.changed_by().is_some_and(|by| by > 0.0),
             });
         });

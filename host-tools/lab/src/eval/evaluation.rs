@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use tactus_core::explorer::Config;
+use tactus_core::table::OpenSet;
 
 use crate::eval::courses::courses;
 use crate::eval::evaluate::{
@@ -34,6 +35,8 @@ pub struct Evaluation {
     pub max_slides: u8,
     /// Seed of all draws.
     pub seed: u64,
+    /// The table's own figures; `null` where the method has none, and in explorations of known textures only.
+    pub open_set: Option<OpenSet>,
     /// Shares of the verdicts: the texture may be unknown, and no slide counts twice.
     pub verdicts: Verdicts,
     /// Mean number of slides until then.
@@ -62,6 +65,8 @@ pub struct EvaluationRequest {
     pub seed: u64,
     /// Ends and choices of the runs.
     pub config: Config,
+    /// True if the texture is one of the table's, and the explorer knows it.
+    pub closed: bool,
     /// True if reliability is wanted: a third of the work.
     pub with_courses: bool,
 }
@@ -94,7 +99,14 @@ pub fn evaluation(
     let (outcomes, at_once): (Vec<Outcome>, Vec<bool>) = played.into_iter().unzip();
     let right = at_once.iter().filter(|right| **right).count();
     let summary = Summary::new(&outcomes, &experiment.names, config.max_slides);
-    let (experiment, config) = as_told(experiment, config);
+    let mut experiment = experiment.each_slide_once();
+    let config = Config {
+        open: !request.closed,
+        ..config
+    };
+    if config.open {
+        experiment.open_set = experiment.run(0).open_set(config.method, || ())?;
+    }
     let mut told = Vec::new();
     stage([2, stages], &mut |done| {
         told = evaluate(&experiment, config, runs, done)?;
@@ -119,19 +131,11 @@ pub fn evaluation(
         threshold: config.threshold,
         max_slides: config.max_slides,
         seed: request.seed,
+        open_set: experiment.open_set,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
         mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
         one_slide_accuracy: right as f64 / at_once.len().max(1) as f64,
         summary,
     };
     Ok((evaluation, all))
-}
-
-/// The experiment as `identify` meets it: the texture may be none of those known, and no slide counts twice.
-fn as_told(experiment: Experiment, config: Config) -> (Experiment, Config) {
-    let config = Config {
-        open: true,
-        ..config
-    };
-    (experiment.each_slide_once(), config)
 }

@@ -12,7 +12,7 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use tactus_core::features::{FeatureSet, Movement, Observation, Properties, PropertySet};
-use tactus_core::table;
+use tactus_core::table::{self, OpenSet};
 
 use crate::data::properties::PropertyTable;
 use crate::data::replay::MeasuredSlide;
@@ -111,6 +111,8 @@ pub struct Experiment {
     /// Features of the fused method; the best there are, unless given.
     features: Option<FeatureSet>,
     expected: Expected,
+    /// Figures that every table gets.
+    pub(crate) open_set: Option<OpenSet>,
     once: bool,
     seed: u64,
     /// Sentences on what was left out of the recordings, or lowered, and on what is tested in turn.
@@ -138,6 +140,7 @@ impl Experiment {
             measured: PropertySet::ALL,
             features: None,
             expected: Expected::default(),
+            open_set: None,
             once: false,
             seed,
             notes: Vec::new(),

@@ -7,9 +7,10 @@ use crate::data::recordings::{RecordingError, RecordingSet};
 use crate::data::replay::MeasuredSlide;
 pub use crate::eval::enough::Enough;
 use crate::eval::enough::LEAST;
-use crate::eval::evaluate::Method;
+use crate::eval::evaluate::{EvaluateError, Method};
 use crate::eval::learn::{Expected, TableError, learn_for, name_finger};
 use crate::eval::learned::note_learned;
+use crate::eval::open_set::TaughtSlide;
 use crate::eval::samples::{note, of_all};
 use crate::eval::show::count;
 
@@ -22,6 +23,9 @@ pub enum FirstError {
     /// The slides make no table.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// Its figures cannot be measured.
+    #[error(transparent)]
+    Figures(#[from] EvaluateError),
     /// The recordings' notes of samples and finger do not fit into a table.
     #[error(transparent)]
     Encode(#[from] EncodeError),
@@ -68,6 +72,31 @@ pub fn learned_textures(
         let (name, movement) = (name.unwrap_or(&none.0), movement.unwrap_or(&none.1));
         FirstError::few(name, *movement, most(movement))
     })
+}
+
+/// All slides of what [`learn_first`] learns, and whether it learns from them.
+/// Errors: as of [`learned_textures`].
+pub fn taught(
+    set: &RecordingSet,
+    measured: &[Vec<MeasuredSlide>],
+    slides: usize,
+) -> Result<Vec<Vec<Vec<TaughtSlide>>>, FirstError> {
+    let Enough {
+        textures,
+        movements,
+        ..
+    } = learned_textures(set, measured)?;
+    let of = |texture: usize, movement: Movement| {
+        let same = measured[texture].iter().filter(|s| s.movement == movement);
+        let slide = |(n, s): (usize, &MeasuredSlide)| TaughtSlide {
+            slide: s.observation(),
+            part: s.session.clone(),
+            learned: n < slides,
+        };
+        same.enumerate().map(slide).collect()
+    };
+    let row = |texture: usize| movements.iter().map(|m| of(texture, *m)).collect();
+    Ok(textures.into_iter().map(row).collect())
 }
 
 /// The table learned from the first slides of every texture and movement: so many, or all where there are fewer; the

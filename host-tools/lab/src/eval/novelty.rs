@@ -8,6 +8,7 @@ use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Config, VerdictKind};
+use tactus_core::table::OpenSet;
 
 use crate::eval::evaluate::{EvaluateError, explorer, play};
 use crate::eval::experiment::{Experiment, Run};
@@ -30,6 +31,8 @@ pub struct After {
 /// The result of leaving textures out.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Novelty {
+    /// The table's own figures.
+    pub open_set: Option<OpenSet>,
     /// After one slide, two, and so on.
     pub novelty: Vec<After>,
     /// Verdicts on the textures that were left out: `new` is right, and `right` is 0.
@@ -45,6 +48,9 @@ pub fn leave_one_out(
     runs: u64,
     done: impl Fn() + Sync,
 ) -> Result<Novelty, EvaluateError> {
+    let mut experiment = experiment.clone();
+    experiment.open_set = experiment.run(0).open_set(config.method, || ())?;
+    let experiment = &experiment;
     // where every run learns from the same slides, there is one table for each texture that is out
     let tables: Mutex<HashMap<usize, Arc<Vec<u8>>>> = Mutex::default();
     let lock = || tables.lock().unwrap_or_else(PoisonError::into_inner);
@@ -97,6 +103,7 @@ pub fn leave_one_out(
         unknown: told(0, after),
     };
     Ok(Novelty {
+        open_set: experiment.open_set,
         novelty: (0..SLIDES).map(after).collect(),
         verdicts_new: Verdicts::of_unknown(presented.iter().map(|(_, told)| told[0].0)),
         verdicts_known: Verdicts::of(presented.iter().map(|(_, told)| told[1])),

@@ -9,6 +9,7 @@ use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::{Event, Prompt};
 
+use crate::eval::open_set;
 use crate::eval::samples;
 use crate::eval::table_summary::TableSummary;
 pub use tactus_link::say::{count, day, percent};
@@ -295,6 +296,11 @@ impl<'t, W: Write> Show<'t, W> {
             VerdictKind::Sure => {
                 writeln!(self.out, "\nIt is {name}: sure to {p:.1} % after {slides}.")
             }
+            VerdictKind::MostLike => writeln!(
+                self.out,
+                "\nIt is most like {name}: {p:.1} % among those I know, after {slides}. I am not sure of names, as too many \
+                 new textures would get one; if nothing new can come, say so with --closed."
+            ),
             VerdictKind::Undecided => writeln!(
                 self.out,
                 "\nNot sure after {slides}; most likely {name}, {p:.1} %."
@@ -303,14 +309,14 @@ impl<'t, W: Write> Show<'t, W> {
     }
 }
 
-/// Returns true if a verdict is right about the texture of this name; `None` if it is undecided.
+/// Returns true if a verdict is right about the texture of this name; `None` if it claims nothing.
 pub fn is_right(verdict: Verdict, truth: &str, table: Table<'_>) -> Option<bool> {
     match verdict.kind() {
         VerdictKind::Sure | VerdictKind::Changed => {
             Some(table.name(verdict.texture) == Some(truth))
         }
         VerdictKind::New => Some(table.find(truth).is_none()),
-        VerdictKind::Undecided => None,
+        VerdictKind::MostLike | VerdictKind::Undecided => None,
     }
 }
 
@@ -361,6 +367,9 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
             }
             (None, Some(_)) => writeln!(out, "no limits: it had fewer than three textures")?,
             (None, None) => {}
+        }
+        if let Some(figures) = table.open_set() {
+            writeln!(out, "{}", open_set::in_words(&figures))?;
         }
         show_samples(table, out)?;
         return show_whitened(table, out);

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use tactus_core::features::Property;
 use tactus_core::sensor::FingerCode;
-use tactus_core::table::{Action, Contents, Drift, Table};
+use tactus_core::table::{Action, Contents, Drift, OpenSet, Table};
 
 use crate::eval::show::apart;
 
@@ -23,6 +23,8 @@ pub struct TableSummary {
     drift: Option<Drift>,
     /// The share of false alarms that its limits are for; `null` where it has none.
     false_alarm: Option<f32>,
+    /// Its own figures; `null` where it has none.
+    pub open_set: Option<OpenSet>,
     /// Lengths of shorter slides that it has statistics of, s at constant speed.
     pub(crate) lengths_s: Vec<f64>,
     /// Its movements, in the order of the table.
@@ -82,6 +84,7 @@ impl TableSummary {
             finger_calibrated: table.calibrated(),
             drift: table.drift(),
             false_alarm: table.limits().map(|limits| limits.false_alarm),
+            open_set: table.open_set(),
             lengths_s: table.lengths_ms().map(|ms| f64::from(ms) / 1e3).collect(),
             movements: table
                 .movements()

@@ -54,7 +54,7 @@ struct Candidate {
 /// The verdict.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Answer {
-    /// `sure`, `changed`, `new` or `undecided`.
+    /// `sure`, `most-like`, `changed`, `new` or `undecided`.
     pub told: &'static str,
     /// The most probable texture; it is the answer with `sure`, and with `changed` if the user says so.
     pub texture: String,
@@ -72,6 +72,7 @@ impl Answer {
         Self {
             told: match verdict.kind() {
                 VerdictKind::Sure => "sure",
+                VerdictKind::MostLike => "most-like",
                 VerdictKind::New => "new",
                 VerdictKind::Changed => "changed",
                 VerdictKind::Undecided => "undecided",

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use tactus_core::explorer::VerdictKind;
 
-/// Shares of explorations, 0 to 1; all but `changed` add up to 1.
+/// Shares of explorations, 0 to 1; all but `changed` and `most_like_right` add up to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Verdicts {
     /// Verdict: the right name, as sure.
@@ -12,6 +12,11 @@ pub struct Verdicts {
     pub new: f64,
     /// Verdict: a wrong name, as sure.
     pub wrong: f64,
+    /// Verdict: "most like this one", of tables that would be sure of a wrong name for too many new textures: neither
+    /// right nor wrong.
+    pub most_like: f64,
+    /// Of these, those that named the right one.
+    pub most_like_right: f64,
     /// Verdict: "not sure", with any name as the most likely one.
     pub undecided: f64,
     /// Of the names told as sure, right or wrong, those with the remark that the texture has changed since it was
@@ -27,10 +32,13 @@ impl Verdicts {
         for (told, is_right) in told {
             all += 1.0;
             counts.changed += f64::from(u8::from(told == VerdictKind::Changed));
+            let most_like_right = told == VerdictKind::MostLike && is_right;
+            counts.most_like_right += f64::from(u8::from(most_like_right));
             *match told {
                 VerdictKind::Sure | VerdictKind::Changed if is_right => &mut counts.right,
                 VerdictKind::Sure | VerdictKind::Changed => &mut counts.wrong,
                 VerdictKind::New => &mut counts.new,
+                VerdictKind::MostLike => &mut counts.most_like,
                 VerdictKind::Undecided => &mut counts.undecided,
             } += 1.0;
         }
@@ -39,6 +47,8 @@ impl Verdicts {
             right: share(counts.right),
             new: share(counts.new),
             wrong: share(counts.wrong),
+            most_like: share(counts.most_like),
+            most_like_right: share(counts.most_like_right),
             undecided: share(counts.undecided),
             changed: share(counts.changed),
         }
@@ -65,13 +75,17 @@ mod tests {
             (VerdictKind::Undecided, true),
             (VerdictKind::Changed, true),
             (VerdictKind::Changed, false),
+            (VerdictKind::MostLike, true),
+            (VerdictKind::MostLike, false),
         ];
         let expected = Verdicts {
-            right: 0.375,
-            new: 0.25,
-            wrong: 0.25,
-            undecided: 0.125,
-            changed: 0.25,
+            right: 0.3,
+            new: 0.2,
+            wrong: 0.2,
+            most_like: 0.2,
+            most_like_right: 0.1,
+            undecided: 0.1,
+            changed: 0.2,
         };
         assert_eq!(Verdicts::of(told), expected);
         assert_eq!(Verdicts::of([]), Verdicts::default());

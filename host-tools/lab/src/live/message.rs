@@ -95,6 +95,8 @@ pub(crate) struct KnownTable {
     pub(crate) maps: Vec<Vec<(f64, f64)>>,
     pub(crate) bytes: usize,
     pub(crate) crc: u32,
+    /// Its own figures in a sentence, if it has any.
+    pub(crate) figures: Option<String>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -8,6 +8,8 @@ use tactus_core::features::{BLOCK, Block, Observation};
 use tactus_core::table::Table;
 use tactus_core::wire::{self, Event};
 
+use crate::eval::open_set::in_words;
+
 use super::message::{Expected, Happening, KnownTable, Measured, name};
 use super::standing::{Followed, PLAN, Standing};
 use crate::eval::places::{Plane, distances, slide_distances};
@@ -70,6 +72,7 @@ impl ProbeMonitor {
             maps: self.planes.iter().map(|p| p.places.clone()).collect(),
             bytes: bytes.len(),
             crc: table.crc(),
+            figures: table.open_set().map(|figures| in_words(&figures)),
         };
     }
 

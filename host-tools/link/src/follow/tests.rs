@@ -158,6 +158,7 @@ fn exploration(method: Method) -> (Vec<u8>, Vec<Event>) {
                     slides,
                     wants_label: method == Method::Fused && !certain,
                     changed: verdict.changed,
+                    most_like: verdict.most_like,
                 }),
                 ExplorationStep::Rejected(..) | ExplorationStep::CutShort(..) => {
                     panic!("{event:?}")
@@ -444,6 +445,7 @@ fn an_exploration_that_was_cut_short_is_followed() {
             slides: 2,
             wants_label,
             changed: known.changed,
+            most_like: known.most_like,
         })
     };
     let followed = |wants_label| follow(&[&events[..], &[verdict(wants_label)]].concat());

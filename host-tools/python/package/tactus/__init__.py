@@ -120,7 +120,7 @@ def identify(table, slides, **arguments):
     the order of time; those of movements that the table does not have are passed over. arguments: method, threshold,
     max_slides, open and false_alarm, as of `Explorer`.
 
-    Returns a dict as of `Explorer.best`: told ("sure", "changed", "new" or "undecided"), texture, probability, slides.
+    Returns a dict as of `Explorer.best`: told ("sure", "most-like", "changed", "new" or "undecided"), texture, probability, slides.
     Raises TableError where a slide lacks what is compared.
     """
     explorer, settings = Explorer(table, **arguments), set(table.settings)

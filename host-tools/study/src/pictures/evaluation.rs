@@ -19,7 +19,7 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
         let column = match told {
             VerdictKind::Sure | VerdictKind::Changed => texture,
             VerdictKind::New => known,
-            VerdictKind::Undecided => known + 1,
+            VerdictKind::MostLike | VerdictKind::Undecided => known + 1,
         };
         counts[course.presented][column] += 1;
     }
@@ -64,12 +64,12 @@ pub fn confusion(courses: &[Course], names: &[String], threshold: f32) -> anyhow
     let verdicts = verdicts(courses, threshold);
     let about = format!(
         "Of {} explorations {:.1} % ended with the right name, {:.1} % with a wrong one, {:.1} % with none of those \
-         known and {:.1} % undecided.",
+         known and {:.1} % undecided or with the one most like it.",
         courses.len(),
         100.0 * verdicts.right,
         100.0 * verdicts.wrong,
         100.0 * verdicts.new,
-        100.0 * verdicts.undecided
+        100.0 * (verdicts.undecided + verdicts.most_like)
     );
     let below = if known > FEW {
         "Darker is more often. Blue: the right name, told as sure. Orange: a wrong one. Grey: none of those known (N), \

@@ -1,9 +1,10 @@
 //! The fused way of deciding against its recipe, written out in f64.
 
 use super::*;
+use crate::explorer::VerdictKind;
 use crate::table::tests::whitening::{Noise, World, learned};
 use crate::table::tests::{fused_of, known, straight};
-use crate::table::{Whitened, Whitening};
+use crate::table::{OpenSet, Share, Whitened, Whitening, with_open_set};
 use std::string::ToString;
 
 /// Steps 4, 6 and 7 of the recipe on the means that the table holds.
@@ -641,6 +642,39 @@ fn what_may_be_unknown_is_not_sure() {
         (verdict.texture, verdict.sure, verdict.unknown),
         (0, true, false)
     );
+}
+
+#[test]
+fn a_name_that_new_textures_too_often_get_is_not_told_as_sure() {
+    let plain = axes();
+    let with_named = |share| {
+        let new_named = Share {
+            share,
+            low: 0.0,
+            high: 1.0,
+        };
+        let figures = OpenSet {
+            new_named,
+            ..OpenSet::default()
+        };
+        let mut out = vec![0; plain.len() + OpenSet::LENGTH];
+        let table = with_open_set(&mut out, &Table::read(&plain).unwrap(), &figures);
+        table.unwrap().as_bytes().to_vec()
+    };
+    for (named, config, kind) in [
+        (0.1, OPEN, VerdictKind::Sure),
+        (0.11, OPEN, VerdictKind::MostLike),
+        (0.11, CLOSED, VerdictKind::Sure),
+    ] {
+        let bytes = with_named(named);
+        let mut explorer = fused(&bytes, config);
+        explorer.observe(look(0), &at(&[6.0, 0.0, 0.0])).unwrap();
+        let verdict = explorer.verdict().unwrap();
+        assert_eq!((verdict.texture, verdict.kind()), (0, kind));
+        let is_sure = kind == VerdictKind::Sure;
+        assert_eq!((verdict.sure, verdict.most_like), (is_sure, !is_sure));
+        assert_eq!(explorer.is_certain(), is_sure);
+    }
 }
 
 #[test]

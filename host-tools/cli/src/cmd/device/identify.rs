@@ -50,7 +50,7 @@ pub(crate) struct Args {
     /// The textures that it may be; all unless given
     #[arg(long, value_name = "T,T,...", value_delimiter = ',')]
     among: Vec<String>,
-    /// It is one of the textures known: never answer that it is none
+    /// It is one of the textures known: never answer that it is none, and tell names as sure
     #[arg(long)]
     closed: bool,
     /// Let the probe learn from an answer that it is certain of

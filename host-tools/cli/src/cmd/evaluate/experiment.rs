@@ -24,9 +24,10 @@ method choose; each slide it asks for is drawn from the test slides of that text
 probable than --threshold, or after --max-slides.
 
 First comes what a user would have been told by `tactus identify`: a name as sure, which is right or wrong, \"none
-of those I know\", or \"not sure\", which is undecided. There the texture may be none of the known ones, no slide
-comes twice, and the exploration ends when the recordings run out. Then come the figures of explorations in which it
-must be one of the known ones and slides are drawn with replacement, as in the paper.
+of those I know\", \"most like\" a name where the table would be sure of a wrong one for too many new textures, or
+\"not sure\", which is undecided. There the texture may be none of the known ones, no slide comes twice, and the
+exploration ends when the recordings run out. Then come the figures of explorations in which it must be one of the
+known ones and slides are drawn with replacement, as in the paper.
 
 With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is
 train or validate, and an action is any (movement, property) pair.
@@ -81,6 +82,9 @@ pub(crate) struct Args {
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with = "novelty")]
     pub(crate) verify: bool,
+    /// It is one of the textures known, and the explorer knows it: nothing is told to be new, and names are told as sure
+    #[arg(long, conflicts_with_all = ["novelty", "verify"])]
+    pub(crate) closed: bool,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
     pub(crate) train_slides: Option<usize>,

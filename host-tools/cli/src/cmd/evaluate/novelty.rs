@@ -8,6 +8,7 @@ use tactus_core::explorer::Config;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::Experiment;
 use tactus_lab::eval::novelty::{self, Novelty};
+use tactus_lab::eval::open_set;
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verdicts::Verdicts;
 
@@ -80,6 +81,9 @@ pub(crate) fn leave_one_out(
             in_words(&after.known)
         )?;
     }
+    if let Some(figures) = &novelty.open_set {
+        writeln!(out, "Its own figures: {}", open_set::in_words(figures))?;
+    }
     let (new, known) = (&novelty.verdicts_new, &novelty.verdicts_known);
     writeln!(
         out,
@@ -92,6 +96,7 @@ pub(crate) fn leave_one_out(
 
 fn in_words(verdicts: &Verdicts) -> String {
     let words = verdict_rows(verdicts);
-    let words = words.map(|(name, share)| format!("{name} {:.1} %", share * 100.0));
-    words.join(", ")
+    let words = words.into_iter();
+    let words = words.map(|(name, share)| format!("{} {:.1} %", name.trim(), share * 100.0));
+    words.collect::<Vec<_>>().join(", ")
 }

@@ -6,9 +6,12 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use tactus_core::explorer::Method;
 use tactus_core::features::Observation;
+use tactus_core::table::{OpenSet, Table};
 
 use super::{Experiment, Pool};
+use crate::eval::evaluate::EvaluateError;
 use crate::eval::learn::{TableError, learn_for};
+use crate::eval::open_set::{all_learned, figures, noted};
 
 /// One virtual exploration, ready to begin.
 #[derive(Clone, Debug)]
@@ -52,15 +55,18 @@ impl<'e> Run<'e> {
 
     /// The texture table learned from the training slides, as bytes.
     pub fn learn(&self, method: Method) -> Result<Vec<u8>, TableError> {
-        let of = self.experiment;
-        learn_for(
-            &of.expected,
-            method,
-            of.features,
-            &of.names,
-            &of.movements,
-            &self.training(),
-        )
+        self.learn_without(method, &[])
+    }
+
+    /// The figures of its table by the slides that it learns from: see [`open_set`](super::super::open_set).
+    pub(crate) fn open_set(
+        &self,
+        method: Method,
+        done: impl Fn() + Sync,
+    ) -> Result<Option<OpenSet>, EvaluateError> {
+        let (bytes, taught) = (self.learn(method)?, all_learned(&self.training()));
+        let expected = &self.experiment.expected;
+        figures(Table::read(&bytes)?, expected, &taught, done)
     }
 
     pub(crate) fn learn_without(
@@ -73,14 +79,18 @@ impl<'e> Run<'e> {
         let kept = all.filter(|(texture, _)| !out.contains(texture));
         let (names, training): (Vec<_>, Vec<_>) = kept.map(|(_, of)| of).unzip();
         let expected = &of.expected;
-        learn_for(
+        let bytes = learn_for(
             expected,
             method,
             of.features,
             &names,
             &of.movements,
             &training,
-        )
+        )?;
+        match &of.open_set {
+            Some(figures) => Ok(noted(&bytes, figures)?),
+            None => Ok(bytes),
+        }
     }
 
     /// One more slide of the unknown texture; `None` where each is shown once, and all of this movement were.

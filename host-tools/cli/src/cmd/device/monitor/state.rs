@@ -195,6 +195,9 @@ impl Monitor {
                     let note =
                         format!("it is {name}, but not as it was learned: {p:.1} % after {after}");
                     (format!("It is {name}, but changed"), note)
+                } else if verdict.most_like {
+                    let note = format!("most like {name}: {p:.1} % after {after}");
+                    (format!("Most like {name}"), note)
                 } else if verdict.sure {
                     let note = format!("it is {name}: {p:.1} % after {after}");
                     (format!("It is {name}"), note)

@@ -140,6 +140,7 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         slides: 1,
         wants_label: false,
         changed: false,
+        most_like: false,
     }));
     let mut monitor = heard(events.clone());
     assert!(
