@@ -120,10 +120,10 @@ fn others(wave: &[i16], bytes: &[u8]) -> Vec<(&'static str, u8, Vec<u8>)> {
     rf64.extend(b"\xff\xff\xff\xff");
     rf64.extend(bytes);
     let row = |(n, x): (usize, &i16)| {
-        let force = if n % 9 == 0 { "" } else { "1,5" };
-        format!("10:00:0{}.{:03};{x},5;{force}\n", n / 500, n % 500 * 2)
+        let force = if n % 9 == 0 { "1,5" } else { "" };
+        format!("0:0:0{:.3};{x};{force}\n", n as f64 / 500.0)
     };
-    let rows: String = wave.iter().take(280).enumerate().map(row).collect();
+    let rows: String = wave.iter().take(260).enumerate().map(row).collect();
     let text = format!("Sampling rate: 500 Hz;\nUhrzeit;x;f\ns;m/s2;N\n{rows}");
     let units = text.encode_utf16().flat_map(u16::to_le_bytes);
     let slides = npy::zipped(&[
@@ -144,7 +144,7 @@ fn others(wave: &[i16], bytes: &[u8]) -> Vec<(&'static str, u8, Vec<u8>)> {
             rf64,
         ),
         (
-            "length = 0.3\npressure = \"f\"\n",
+            "channel = \"x\"\n",
             0,
             [0xff, 0xfe].into_iter().chain(units).collect(),
         ),

@@ -171,7 +171,15 @@ pub(super) fn rate_of(times: &[f64]) -> Result<(f64, Vec<usize>), String> {
         return Err(stands());
     }
     let jumps = (1..).zip(steps(times)).filter(|(_, step)| !usual(step));
-    Ok((count as f64 / sum, jumps.map(|(at, _)| at).collect()))
+    let rate = count as f64 / sum;
+    // the times are rounded, a clock is not
+    let whole = rate.round();
+    let rate = if (rate - whole).abs() < 1e-6 * whole {
+        whole
+    } else {
+        rate
+    };
+    Ok((rate, jumps.map(|(at, _)| at).collect()))
 }
 
 /// The channels that may be the vibration, the liveliest first: by their names, then by how much they bend.
@@ -231,4 +239,26 @@ pub(super) fn no_channel(signals: &Signals, wanted: &str) -> String {
 pub(super) fn names(signals: &Signals) -> String {
     let names = signals.channels.iter().map(|(name, _)| name.as_str());
     names.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_by_rounded_times_are_whole() {
+        for rate in [100.0, 500.0, 1600.0, 2200.0, 44_100.0] {
+            let times = |n: u32| (f64::from(n) / rate * 1e6).round() / 1e6;
+            let times: Vec<f64> = (0..rate as u32 + 1).map(times).collect();
+            assert_eq!(rate_of(&times), Ok((rate, Vec::new())));
+        }
+        // bursts of four, and a jump before the last one
+        let bursts = [0.0, 0.0, 0.0, 0.0, 0.4, 0.4, 0.4, 0.4, 0.8, 9.0];
+        assert_eq!(rate_of(&bursts).unwrap(), (10.0, vec![9]));
+        assert!(
+            rate_of(&[1.0, 1.0, 1.0])
+                .unwrap_err()
+                .contains("does not go on")
+        );
+    }
 }

@@ -163,7 +163,9 @@ pub(super) fn read(bytes: &[u8], most: usize) -> Result<Signals, String> {
     let end = if text.contains('\n') { '\n' } else { '\r' };
     let lines = Lines { text: &text, end };
     let usual = lines.usual();
-    let style = Style::of(usual.first().ok_or("an empty file")?);
+    let mut style = Style::of(usual.first().ok_or("an empty file")?);
+    // a row of whole numbers has none
+    style.decimal_comma = usual.iter().any(|row| Style::of(row).decimal_comma);
     let begin = begin(&lines, style, &usual);
     let before: Vec<&str> = lines.begin().take(begin).collect();
     let first = lines.begin().nth(begin).unwrap_or_default();

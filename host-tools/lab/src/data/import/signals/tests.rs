@@ -32,6 +32,9 @@ Sensor: ADXL345~Author;me~t;x~0;1.5~1;-2 | lines before the table
         };
         assert_eq!(column[..2], [&[0.0, 1.0][..], &[first, -2.0]], "{what}");
     }
+    // the first of the usual rows has whole numbers
+    let whole = signals("t;x~0;1~1;2~2;3~3;4,5~4;5").unwrap();
+    assert_eq!(whole.channels[1].1, [1.0, 2.0, 3.0, 4.5, 5.0]);
     let bars = signals("t|x~0|1.5~1|-2").unwrap();
     assert_eq!(bars.channels[1].1, [1.5, -2.0]);
     let utf16 = |mark: &[u8], of: fn(u16) -> [u8; 2]| {
