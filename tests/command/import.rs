@@ -9,7 +9,7 @@ use tactus_lab::data::recordings::RecordingSet;
 
 use crate::{Scratch, assert_says};
 
-const TEXTURES: [(&str, f64); 4] = [
+pub(crate) const TEXTURES: [(&str, f64); 4] = [
     ("cork", 0.02),
     ("denim", 0.045),
     ("silk", 0.1),
@@ -19,7 +19,7 @@ const EACH: usize = 7;
 
 /// A recording: still, a slide in which a resonance that is the texture's rings, still. `octave` says how far below the
 /// rate all of it is.
-fn recording(texture: usize, number: usize, rate_hz: f64, octave: f64) -> Vec<f64> {
+pub(crate) fn recording(texture: usize, number: usize, rate_hz: f64, octave: f64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64((texture * 100 + number) as u64);
     let seconds = if rate_hz < 500.0 { 44.0 } else { 2.4 };
     let samples = (seconds * rate_hz) as usize;
@@ -47,7 +47,7 @@ fn recording(texture: usize, number: usize, rate_hz: f64, octave: f64) -> Vec<f6
 }
 
 /// All recordings, as this layout has each: the texture's name, its number, and the samples.
-fn each(rate_hz: f64, octave: f64, mut put: impl FnMut(&str, usize, &[f64])) {
+pub(crate) fn each(rate_hz: f64, octave: f64, mut put: impl FnMut(&str, usize, &[f64])) {
     for (texture, (name, _)) in TEXTURES.iter().enumerate() {
         for number in 0..EACH {
             put(name, number, &recording(texture, number, rate_hz, octave));
@@ -88,14 +88,14 @@ pub(crate) fn wav(rate: u32, bits: u16, channels: &[&[f64]]) -> Vec<u8> {
     file
 }
 
-fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+pub(crate) fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     let header = format!("{header:<117}\n");
     [b"\x93NUMPY\x01\0\x76\0", header.as_bytes(), data].concat()
 }
 
 /// Imports, and has the evaluation say how many of the names are right.
-fn verdict(at: &Scratch, options: &str) -> RecordingSet {
+pub(crate) fn verdict(at: &Scratch, options: &str) -> RecordingSet {
     let import = at.printed(&format!("import data recordings {options}"));
     assert_says(&import, &["cork", "suede", "recordings: written"]);
     let said = at.printed("evaluate --recordings recordings --train-slides 4 --runs 200");

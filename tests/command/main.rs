@@ -8,6 +8,7 @@ mod kills;
 mod offline;
 mod protocols;
 mod refusals;
+mod strangers;
 mod study;
 mod verdicts;
 

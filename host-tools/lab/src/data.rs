@@ -1,5 +1,6 @@
 //! Recordings of slides, tables of properties, and what is read from other formats.
 
+#[cfg(feature = "files")]
 pub mod import;
 pub mod printable;
 pub mod program;

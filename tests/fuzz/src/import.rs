@@ -38,6 +38,19 @@ pub fn signals(data: &[u8]) {
         assert_eq!(channel.len(), samples, "sampled together");
         assert!(channel.iter().all(|x| x.is_finite()));
     }
+    for (name, missing) in &signals.missing {
+        assert!(signals.channel(name).is_some() && missing.is_sorted_by(|a, b| a < b));
+        assert!(missing.last().is_none_or(|row| *row < samples));
+    }
+    let mut end = 0;
+    for piece in &signals.pieces {
+        assert!(
+            piece.rows.start == end && piece.rows.end > end,
+            "side by side"
+        );
+        end = piece.rows.end;
+    }
+    assert!(signals.pieces.is_empty() || end == samples);
     for (_, words) in &signals.words {
         let ends: Vec<usize> = words.iter().map(|(_, end)| *end).collect();
         assert!(ends.is_sorted_by(|a, b| a < b));
@@ -64,7 +77,8 @@ fn imported(data: &[u8]) -> Result<(), String> {
         fs::write(path, bytes).expect("a file in RAM");
     };
     put(&from.join(SETTINGS), settings);
-    put(&from.join("day1/felt/a_1.dat"), &file(rest));
+    // a name by which a pattern can say all that it can say
+    put(&from.join("day1/felt/a_1_25_0.5.dat"), &file(rest));
     let said = |why: tactus_lab::data::recordings::RecordingError| why.to_string();
     let survey = Survey::of(&from, Settings::default(), &|_, _| ()).map_err(said)?;
     let left_out = survey.write(&to, &|_, _| ()).map_err(said)?;
@@ -95,6 +109,52 @@ fn wav(rate_hz: u32, channels: &[&[i16]]) -> Vec<u8> {
     let all = (0..samples).flat_map(|n| channels.iter().map(move |channel| channel[n]));
     file.extend(all.flat_map(i16::to_le_bytes));
     file
+}
+
+/// The same in the other layouts: RF64, UTF-16 with units and instants, arrays with labels.
+fn others(wave: &[i16], bytes: &[u8]) -> Vec<(&'static str, u8, Vec<u8>)> {
+    let plain = wav(1000, &[wave]);
+    let mut rf64 = b"RF64\xff\xff\xff\xffWAVEds64\x10\0\0\0\0\0\0\0\0\0\0\0".to_vec();
+    rf64.extend((bytes.len() as u64).to_le_bytes());
+    rf64.extend(&plain[12..40]);
+    rf64.extend(b"\xff\xff\xff\xff");
+    rf64.extend(bytes);
+    let row = |(n, x): (usize, &i16)| {
+        let force = if n % 9 == 0 { "1,5" } else { "" };
+        format!("0:0:0{:.3};{x};{force}\n", n as f64 / 500.0)
+    };
+    let rows: String = wave.iter().take(260).enumerate().map(row).collect();
+    let text = format!("Sampling rate: 500 Hz;\nUhrzeit;x;f\ns;m/s2;N\n{rows}");
+    let units = text.encode_utf16().flat_map(u16::to_le_bytes);
+    let slides = npy::zipped(&[
+        ("X", npy::array("<i2", &[2, 1200], bytes)),
+        ("y", npy::words(["felt", "silk"].into_iter())),
+        ("day", npy::array("|u1", &[2], &[1, 2])),
+        ("fs", npy::array("|u1", &[], &[200])),
+    ]);
+    let column = npy::array("<i2", &[2400], bytes);
+    let columns = npy::zipped(&[
+        ("x", column),
+        ("what", npy::words(wave.iter().map(|_| "felt"))),
+    ]);
+    vec![
+        (
+            "texture = \"{texture}_{run}_{speed}_{force}.dat\"\n",
+            0,
+            rf64,
+        ),
+        (
+            "channel = \"x\"\n",
+            0,
+            [0xff, 0xfe].into_iter().chain(units).collect(),
+        ),
+        ("", 0, slides.expect("memory")),
+        (
+            "rate = 800\ntexture = \"what\"\n",
+            1,
+            columns.expect("memory"),
+        ),
+    ]
 }
 
 /// Files of each kind that are right, long enough for a slide and of 8 KB at most; `import` has settings before them.
@@ -138,7 +198,8 @@ pub(crate) fn seeds(with_settings: bool) -> Vec<Vec<u8>> {
             rows(";").into_bytes(),
         ),
     ];
-    let seeds = all.into_iter().map(|(settings, mode, file)| {
+    let others = others(&wave, &bytes);
+    let seeds = all.into_iter().chain(others).map(|(settings, mode, file)| {
         let head = if with_settings {
             [settings.as_bytes(), RULE].concat()
         } else {

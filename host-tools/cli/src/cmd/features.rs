@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let (set, measured) = measure_folder(&args.from.folder()?)?;
     if args.format == Rows::Npz {
         // as it is: what is printed has no bytes that do not print
-        return Ok(std::io::stdout().write_all(&arrays(&set, &measured))?);
+        return Ok(std::io::stdout().write_all(&arrays(&set, &measured)?)?);
     }
     let textures = set.textures().iter().zip(&measured).enumerate();
     let rows = textures.flat_map(|(index, (texture, slides))| {
@@ -192,7 +192,7 @@ fn text<'s>(
 }
 
 /// The features that the method `fused` would use of these slides, as a `.npz` file.
-fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> Vec<u8> {
+fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> std::io::Result<Vec<u8>> {
     let slides: Vec<Vec<Vec<Observation>>> = measured
         .iter()
         .map(|slides| {

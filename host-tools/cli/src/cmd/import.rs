@@ -15,18 +15,20 @@ use super::progress::progress;
 /// Most files that are drawn.
 const DRAWN: usize = 8;
 
-/// Bring recordings of any sensor: WAV, CSV, numpy arrays, or a published data set
+/// Bring recordings of any sensor: WAV, tables, numpy arrays, MCAP of a probe, or a published data set
 #[derive(clap::Args)]
 #[command(after_help = "\
 What the files do not say is found by looking at them, and told. What cannot be found is asked for; give it as an
 option, or in the file import.toml beside the data, which a first look writes with --template.
 
 The texture is the folder of a file, or its name without the number at the end, or what --texture says; folders such
-as day2 or session-1 are sessions. Long sliding is divided into slides, which are marked as of one run.
+as day2 or session-1 are sessions. Long sliding is divided into slides, which are marked as of one run. A file that
+cannot be read is left out and named, where most others can.
 
 Examples:
   tactus import my-wavs recordings                      # cotton/1.wav, cotton/2.wav, silk/1.wav ...
-  tactus import log.csv recordings --texture material   # a column of words names the texture
+  tactus import log.csv recordings --texture material   # a column names the texture
+  tactus import slides.npz recordings                   # X with a row for each slide, y its texture, fs the rate
   tactus import data recordings --rate 1000 --channel z --texture '{session}/{texture}_*.csv'
   tactus import data recordings --dry-run               # shows what was found, and writes nothing
   tactus import day2 more --like recordings             # another day, to be compared with the first
@@ -99,11 +101,7 @@ fn signals(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let survey = survey?;
     tell(&survey, out)?;
     if args.template {
-        let folder = match args.from.is_dir() {
-            true => args.from.as_path(),
-            false => args.from.parent().unwrap_or(&args.from),
-        };
-        let path = folder.join(SETTINGS);
+        let path = survey.folder().join(SETTINGS);
         ensure!(
             !path.exists(),
             "{} is there already; change it, or remove it first",
@@ -152,12 +150,7 @@ fn tell(survey: &Survey, out: &mut impl Write) -> anyhow::Result<()> {
             figures(highest)
         )?;
     }
-    writeln!(
-        out,
-        "  channel {}, {} counts per unit",
-        survey.channel,
-        figures(survey.gain)
-    )?;
+    channels(survey, out)?;
     let still = survey.found.iter().filter(|found| found.still).count();
     match still {
         0 => writeln!(
@@ -199,6 +192,30 @@ fn tell(survey: &Survey, out: &mut impl Write) -> anyhow::Result<()> {
         let (files, slides, sessions) = of.remove(texture.as_str()).unwrap_or_default();
         let sessions = sessions.len();
         writeln!(out, "{texture:<40} {files:>10} {slides:>8} {sessions:>8}")?;
+    }
+    Ok(())
+}
+
+/// The channels and their gains, and what nothing said.
+fn channels(survey: &Survey, out: &mut impl Write) -> anyhow::Result<()> {
+    let (channel, gain) = (&survey.channel, figures(survey.gain));
+    match survey.unit() {
+        "counts" if survey.gain == 1.0 => writeln!(out, "  channel {channel}, in counts")?,
+        unit => writeln!(out, "  channel {channel}, {gain} counts per {unit}")?,
+    }
+    match (survey.pressure(), survey.pressure_gain) {
+        (Some(column), Some(gain)) => {
+            let gain = figures(gain);
+            writeln!(out, "  P_DC from {column}, {gain} counts per unit")?;
+        }
+        (Some(column), None) => writeln!(out, "  no P_DC: {column} never changes")?,
+        (None, _) => {}
+    }
+    for note in &survey.notes {
+        writeln!(out, "  {note}")?;
+    }
+    for why in &survey.left_out {
+        writeln!(out, "  left out: {why}")?;
     }
     Ok(())
 }

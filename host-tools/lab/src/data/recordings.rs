@@ -265,6 +265,7 @@ impl RecordingSet {
 }
 
 /// True if a folder has a manifest, or recordings that are not whole.
+#[cfg(feature = "files")]
 pub(crate) fn is_there(folder: &Path) -> bool {
     let manifests = [
         files::OWN_MANIFEST,

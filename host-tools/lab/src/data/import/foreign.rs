@@ -18,18 +18,20 @@ use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
 
+mod columns;
 mod memory;
 mod paths;
 mod reading;
+mod summary;
 
+use columns::lively;
 pub use memory::InMemory;
-use paths::files;
-use reading::{How, liveliest, rounded};
+use paths::{BESIDE, add, files, folder_of, known_layout};
+use reading::How;
+use summary::{gains, notes, readable, textures};
 
 /// Largest value that the samples are made to have: 12 bits with a little room.
 const FULL: f64 = 2000.0;
-/// Smallest change of any sensor, in any unit.
-const SMALLEST: f64 = 1e-30;
 /// P_AC before the window, so that the filter has filled, in samples.
 const BEFORE: usize = 220;
 /// Longest still part that is kept, in samples.
@@ -48,6 +50,10 @@ pub struct Found {
     pub texture: String,
     /// Its session, empty if unknown.
     pub session: String,
+    /// The run that it is of.
+    pub run: String,
+    /// Its movement, as far as it is known.
+    pub movement: Movement,
     /// Length in s, on the sensor's clock.
     pub seconds: f64,
     /// How lively each of [`WIDTH`] parts is, 0 to 1.
@@ -58,6 +64,8 @@ pub struct Found {
     pub gaps: usize,
     /// True if the finger is still in a part of it.
     pub still: bool,
+    /// Shortest recording with a slide, s, where this one is shorter.
+    short: Option<f64>,
     rows: Range<usize>,
     ranges: Parts,
     peak: f64,
@@ -81,6 +89,10 @@ pub struct Survey {
     pub textures: Vec<String>,
     /// Counts of P_DC per unit of its column; `None` where there is none, or it never changes.
     pub pressure_gain: Option<f64>,
+    /// Facts that nothing said, and how they were found.
+    pub notes: Vec<String>,
+    /// The files that cannot be read, and the textures without a slide.
+    pub left_out: Vec<String>,
     source: Source,
     settings: Settings,
 }
@@ -96,11 +108,16 @@ enum Source {
 
 impl Source {
     /// The signals of a path, and its name in errors.
-    fn signals(&self, path: &str) -> Result<(Cow<'_, Signals>, PathBuf)> {
+    fn signals(&self, path: &str, settings: &Settings) -> Result<(Cow<'_, Signals>, PathBuf)> {
         match self {
             Self::Files(_) => {
+                let beside = self.folder().join("..").join(BESIDE).join(path);
                 let path = self.folder().join(path);
-                Ok((Cow::Owned(Signals::read(&path)?), path))
+                let mut signals = Signals::read(&path)?;
+                if settings.pressure.as_deref() == Some(BESIDE) {
+                    add(&mut signals, &beside, settings)?;
+                }
+                Ok((Cow::Owned(signals), path))
             }
             Self::Memory(all) => Ok((Cow::Borrowed(memory::find(all, path)?), path.into())),
         }
@@ -115,11 +132,7 @@ impl Source {
     }
 
     fn folder(&self) -> &Path {
-        let path = self.path();
-        match path.is_dir() {
-            true => path,
-            false => path.parent().unwrap_or(path),
-        }
+        folder_of(self.path())
     }
 
     fn path(&self) -> &Path {
@@ -128,6 +141,37 @@ impl Source {
             Self::Memory(_) => Path::new(memory::FOLDER),
         }
     }
+}
+
+/// How all files are read, the channels that may be the vibration, their kind and what it says: by the first one that
+/// can be read.
+fn first(
+    source: &Source,
+    paths: &[(String, Named)],
+    settings: Settings,
+) -> Result<(How, Vec<String>, &'static str, Settings)> {
+    let mut refused = None;
+    let found = paths.iter().find_map(|(path, _)| {
+        let first = source
+            .signals(path, &settings)
+            .and_then(|(signals, place)| {
+                let at = |why: String| RecordingError::at(&place, why);
+                let lively = match &settings.channel {
+                    Some(channel) => vec![channel.clone()],
+                    None => lively(&signals, &settings).map_err(at)?,
+                };
+                let how = How::new(&signals, &settings).map_err(at)?;
+                Ok((
+                    how,
+                    lively,
+                    signals.kind,
+                    settings.clone().completed(&signals),
+                ))
+            });
+        first.map_err(|why| refused.get_or_insert(why)).ok()
+    });
+    let none = || RecordingError::at(source.path(), "there are no recordings");
+    found.ok_or_else(|| refused.unwrap_or_else(none))
 }
 
 impl Survey {
@@ -139,16 +183,13 @@ impl Survey {
         settings: Settings,
         progress: &(dyn Fn(usize, usize) + Sync),
     ) -> Result<Self> {
-        let folder = if from.is_dir() {
-            from
-        } else {
-            from.parent().unwrap_or(from)
-        };
-        let settings = settings.with_file(folder)?;
-        let at = |why: String| RecordingError::at(from, why);
-        settings.check().map_err(at)?;
-        let paths = files(from, &settings)?;
-        Self::look(Source::Files(from.to_owned()), &paths, settings, progress)
+        let (from, settings) = known_layout(from, settings);
+        let settings = settings.with_file(folder_of(&from))?;
+        settings
+            .check()
+            .map_err(|why| RecordingError::at(&from, why))?;
+        let paths = files(&from, &settings)?;
+        Self::look(Source::Files(from), &paths, settings, progress)
     }
 
     fn look(
@@ -157,39 +198,73 @@ impl Survey {
         settings: Settings,
         progress: &(dyn Fn(usize, usize) + Sync),
     ) -> Result<Self> {
-        let at = |why: String| RecordingError::at(source.path(), why);
-        let Some((path, _)) = paths.first() else {
-            return Err(at("there are no recordings".to_owned()));
-        };
-        let (first, _) = source.signals(path)?;
-        let channel = match &settings.channel {
-            Some(channel) => channel.clone(),
-            None => liveliest(&first, &settings).map_err(at)?,
-        };
-        let how = How::new(&first, &settings).map_err(at)?;
+        let (how, lively, kind, settings) = first(&source, paths, settings)?;
+        let channel = lively[0].as_str();
         let done = std::sync::atomic::AtomicUsize::new(0);
         let memory = |(path, _): &(String, _)| source.memory(path);
-        let found = each_in_flight(paths, memory, |(path, named)| {
-            let (signals, place) = source.signals(path)?;
-            let found = how.look(path, named, &signals, &channel, &settings);
+        let looked = each_in_flight(paths, memory, |(path, named)| {
+            let looked = source.signals(path, &settings).and_then(|(signals, place)| {
+                let at = |why: String| RecordingError::at(&place, why);
+                let own = How::new(&signals, &settings).map_err(at)?;
+                Ok(match own.is_like(&how) {
+                    true => Ok(own.look(path, named, &signals, channel, &settings).map_err(at)?),
+                    false => Err(at(format!(
+                        "{:.1} Hz, and the first file has {:.1} Hz: import files of one kind at a time, chosen by \
+                         --texture \"{{texture}}/*_imu.csv\" and the like",
+                        own.rate_hz, how.rate_hz
+                    ))),
+                })
+            });
             let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             progress(done, paths.len());
-            found.map_err(|why| RecordingError::at(&place, why))
+            // two kinds of files are no accident
+            looked.map_or_else(
+                |why| Ok(Err(why)),
+                |found: Result<Vec<Found>>| found.map(Ok),
+            )
         })?;
-        let found: Vec<Found> = found.into_iter().flatten().collect();
-        let (gain, pressure) = gains(&found, &channel, &settings).map_err(at)?;
-        let textures = textures(&found).map_err(at)?;
+        let (found, mut left_out) = readable(looked, &source)?;
+        let at = |why: String| RecordingError::at(source.path(), why);
+        let (textures, short) = textures(&found).map_err(at)?;
+        if let (Source::Memory(_), Some(why)) = (&source, short.first()) {
+            return Err(at(why.clone()));
+        }
+        left_out.extend(short);
+        let found: Vec<Found> = found
+            .into_iter()
+            .filter(|f| textures.contains(&f.texture))
+            .collect();
+        let (gain, pressure) = gains(&found, channel, &settings).map_err(at)?;
         Ok(Self {
             found,
             rate_hz: how.rate_hz,
-            channel,
+            channel: channel.to_owned(),
             gain,
-            kind: first.kind,
+            kind,
             pressure_gain: pressure,
             textures,
+            notes: notes(&how, &lively),
+            left_out,
             source: source.clone(),
             settings,
         })
+    }
+
+    /// The unit of the vibration.
+    pub fn unit(&self) -> &str {
+        let said = self.settings.unit.as_deref();
+        let unit = said.or_else(|| super::signals::unit(&self.channel));
+        unit.unwrap_or("unit")
+    }
+
+    /// The column of P_DC.
+    pub fn pressure(&self) -> Option<&str> {
+        self.settings.pressure.as_deref()
+    }
+
+    /// The folder of the files.
+    pub fn folder(&self) -> &Path {
+        self.source.folder()
     }
 
     /// Slides in all.
@@ -250,7 +325,7 @@ impl Survey {
         let (mut copies, mut left_out) = (Copies::default(), Vec::new());
         // the parts of a file lie next to each other
         for parts in self.found.chunk_by(|a, b| a.path == b.path) {
-            let (signals, place) = self.source.signals(&parts[0].path)?;
+            let (signals, place) = self.source.signals(&parts[0].path, &self.settings)?;
             let at = |why: String| RecordingError::at(&place, why);
             let how = How::new(&signals, &self.settings).map_err(at)?;
             for found in parts {
@@ -270,8 +345,7 @@ impl Survey {
                 let pdc = slow(&self.settings.pressure, self.pressure_gain)?;
                 let shear = slow(&self.settings.shear, Some(1e3))?;
                 for range in &found.ranges.slides {
-                    let slide =
-                        self.slide(&pac, range, &found.ranges, pdc.as_deref(), shear.as_deref());
+                    let slide = self.slide(&pac, range, found, pdc.as_deref(), shear.as_deref());
                     let slide = Recording {
                         texture,
                         number: numbers[texture] + 1,
@@ -312,10 +386,7 @@ impl Survey {
     fn labels(&self, found: &Found) -> Labels {
         Labels {
             session: found.session.clone(),
-            run: match &self.source {
-                Source::Files(_) => found.path.clone(),
-                Source::Memory(all) => memory::run(all, &found.path),
-            },
+            run: found.run.clone(),
             finger: FingerCode::OTHER,
             sensor: self
                 .settings
@@ -330,7 +401,7 @@ impl Survey {
         &self,
         pac: &[i16],
         range: &Range<usize>,
-        parts: &Parts,
+        found: &Found,
         pdc: Option<&[i16]>,
         shear: Option<&[i16]>,
     ) -> std::result::Result<Recording, String> {
@@ -343,7 +414,8 @@ impl Survey {
                 .unwrap_or_default()
                 .to_vec()
         };
-        let still = parts
+        let still = found
+            .ranges
             .still
             .clone()
             .map(|still| &pac[still.start..still.end.min(still.start + STILL)]);
@@ -352,11 +424,7 @@ impl Survey {
         let slide = Recording {
             texture: 0,
             number: 0,
-            movement: match (self.settings.force, self.settings.speed) {
-                (None, None) => Movement::UNKNOWN,
-                (force, speed) => Movement::from_si(force.unwrap_or(0.5), speed.unwrap_or(25.0))
-                    .map_err(|why| why.to_string())?,
-            },
+            movement: found.movement,
             window: (seconds(range.start - start), seconds(range.end - start)),
             blocks: Vec::new(),
             background: still.is_none().then_some(0.0),
@@ -378,56 +446,5 @@ impl Survey {
             &pac[start..range.end],
             shear.as_deref(),
         )
-    }
-}
-
-/// Counts per unit of the vibration, and of the pressure where it changes.
-fn gains(
-    found: &[Found],
-    channel: &str,
-    settings: &Settings,
-) -> std::result::Result<(f64, Option<f64>), String> {
-    let peak = found.iter().map(|f| f.peak).fold(0.0, f64::max);
-    let pressure = found.iter().map(|f| f.pressure).fold(0.0, f64::max);
-    if peak < SMALLEST {
-        return Err(format!(
-            "channel {channel:?} never changes: is the sensor connected?"
-        ));
-    }
-    let gain = match (settings.gain, settings.unit.as_deref()) {
-        (Some(gain), _) if gain.is_normal() && gain > 0.0 => gain,
-        (Some(gain), _) => {
-            return Err(format!(
-                "a gain of {gain} is impossible; give counts per unit"
-            ));
-        }
-        (None, Some("counts")) => 1.0,
-        (None, _) => rounded(FULL / peak),
-    };
-    Ok((
-        gain,
-        (pressure > SMALLEST).then(|| rounded(FULL / pressure)),
-    ))
-}
-
-/// The textures in the order of their first file; each has a slide.
-fn textures(found: &[Found]) -> std::result::Result<Vec<String>, String> {
-    let (mut textures, mut slides) = (Vec::new(), HashMap::new());
-    for f in found {
-        let of = slides.entry(f.texture.as_str()).or_insert_with(|| {
-            textures.push(f.texture.clone());
-            0
-        });
-        *of += f.ranges.slides.len();
-    }
-    match textures
-        .iter()
-        .find(|texture| slides[texture.as_str()] == 0)
-    {
-        Some(texture) => Err(format!(
-            "no sliding was found in the recordings of {texture}; say where it is by --window FROM,TO (in Python by \
-             cut=False), or leave them out"
-        )),
-        None => Ok(textures),
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::signals::Signals;
 use crate::data::recordings::files::confined;
 use crate::data::recordings::{RecordingError, Result, read_bounded};
 
@@ -21,7 +22,7 @@ pub struct Settings {
     /// Samples per second, where the files have no time
     #[cfg_attr(feature = "arguments", arg(long, value_name = "HZ"))]
     pub rate: Option<f64>,
-    /// Column of the time in s (ms, us if its name says so)
+    /// Column of the time: s, ms, us, ns as its name or its steps say, or instants such as 2026-11-28T10:00:00.125
     #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN"))]
     pub time: Option<String>,
     /// Column or channel of the vibration, by name or number; the liveliest one by default
@@ -39,10 +40,11 @@ pub struct Settings {
     /// Column of the tangential force against the motion in N; none by default
     #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN"))]
     pub shear: Option<String>,
-    /// Name of the texture: a column of words, or a pattern of paths: "{session}/{texture}_*.wav"
+    /// Name of the texture: a column, or a pattern of paths with {texture}, {session}, {run}, {speed} in mm/s, {force}
+    /// in N or {force_mn}, and * for anything: "{session}/{texture}_*.wav"
     #[cfg_attr(feature = "arguments", arg(long, value_name = "COLUMN|PATTERN"))]
     pub texture: Option<String>,
-    /// Session of all files
+    /// Session of all files, or the column that names it
     #[cfg_attr(feature = "arguments", arg(long))]
     pub session: Option<String>,
     /// Name of the sensor
@@ -71,7 +73,7 @@ const HELP: [(&str, &str, &str); 14] = [
     (
         "time",
         "\"time_s\"",
-        "column of the time in s (ms or us if its name says so)",
+        "column of the time: s, ms, us, ns as its name or its steps say, or instants",
     ),
     (
         "channel",
@@ -93,9 +95,13 @@ const HELP: [(&str, &str, &str); 14] = [
     (
         "texture",
         "\"{session}/{texture}_*.csv\"",
-        "a column of words, or a pattern of paths",
+        "a column, or a pattern of paths: {texture} {session} {run} {speed} {force} {force_mn} *",
     ),
-    ("session", "\"monday\"", "session of all files"),
+    (
+        "session",
+        "\"monday\"",
+        "session of all files, or its column",
+    ),
     ("finger", "\"my-sensor\"", "name of the sensor"),
     ("force", "0.5", "contact force, N"),
     ("speed", "25.0", "sliding speed, mm/s"),
@@ -149,6 +155,24 @@ impl Settings {
         })
     }
 
+    /// These, and what the first file says by its kind: MCAP of ours has its columns.
+    pub(super) fn completed(mut self, first: &Signals) -> Self {
+        if first.kind == "MCAP" {
+            let has = |name: &str| Some(first.channel(name)?.0.clone());
+            self.unit.get_or_insert_with(|| "counts".to_owned());
+            self.pressure = self.pressure.or_else(|| has("pdc"));
+            self.shear = self.shear.or_else(|| has("shear"));
+        }
+        self
+    }
+
+    /// The pattern of paths, if the texture is given by one.
+    pub(super) fn pattern(&self) -> Option<&str> {
+        self.texture
+            .as_deref()
+            .filter(|texture| texture.contains(['{', '*']))
+    }
+
     /// The file of these settings: each with a line that says what it is, those that are open as comments.
     pub fn template(&self) -> String {
         let given = toml::Table::try_from(self).unwrap_or_default();
@@ -168,6 +192,9 @@ impl Settings {
             return Err(format!(
                 "--texture has more than {MAX_PATTERN} bytes; give a column, or a shorter pattern"
             ));
+        }
+        if let Some(pattern) = self.pattern() {
+            check_pattern(pattern)?;
         }
         match self.length {
             Some(length) if !(length > 0.0 && length <= MAX_LENGTH_S) => Err(format!(
@@ -193,10 +220,60 @@ impl Settings {
 }
 
 /// What a path says of its recording.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Named {
     pub texture: String,
     pub session: String,
+    /// Its run; empty: the file.
+    pub run: String,
+    /// Contact force in N, and sliding speed in mm/s.
+    pub force: Option<f32>,
+    pub speed: Option<f32>,
+}
+
+/// Fields of a pattern, and whether these are numbers.
+const FIELDS: [(&str, bool); 6] = [
+    ("texture", false),
+    ("session", false),
+    ("run", false),
+    ("speed", true),
+    ("force", true),
+    ("force_mn", true),
+];
+
+fn is_number(field: &str) -> bool {
+    FIELDS.contains(&(field, true))
+}
+
+impl Named {
+    /// Takes the value of a field.
+    fn take(&mut self, field: &str, value: String) -> Option<()> {
+        let number = || value.parse::<f32>().ok();
+        match field {
+            "texture" => self.texture = value,
+            "session" => self.session = value,
+            "run" => self.run = value,
+            "speed" => self.speed = Some(number()?),
+            "force" => self.force = Some(number()?),
+            _ => self.force = Some(number()? / 1e3),
+        }
+        Some(())
+    }
+}
+
+/// Refuses fields that no pattern has.
+fn check_pattern(pattern: &str) -> std::result::Result<(), String> {
+    let fields = pattern.split('{').skip(1);
+    let mut fields = fields.filter_map(|rest| Some(rest.split_once('}')?.0));
+    let unknown = |field: &&str| !field.is_empty() && FIELDS.iter().all(|(name, _)| name != field);
+    match fields.find(unknown) {
+        Some(field) => Err(format!(
+            "{{{field}}} is no field of a pattern; there are {{{}}}, and * for anything",
+            FIELDS.map(|(name, _)| name).join("}, {")
+        )),
+        None if pattern.contains("{texture}") => Ok(()),
+        None => Err(format!("{pattern:?} has no {{texture}}")),
+    }
 }
 
 /// Longest pattern of paths, bytes.
@@ -208,8 +285,10 @@ enum Part<'p> {
     Letter(char),
     /// The first letter of a field of this name.
     Field(&'p str),
-    /// Letters up to what comes next, or none.
-    Rest,
+    /// Letters up to what comes next, or none; of a number its digits.
+    Rest {
+        digits: bool,
+    },
 }
 
 /// A pattern beside a path.
@@ -233,14 +312,19 @@ impl Match<'_> {
             return false;
         }
         let next = self.path.get(at).copied();
-        let is_name = next.is_some_and(|c| c != '/');
+        let is_name = |digits: bool| {
+            next.is_some_and(|c| match digits {
+                true => c.is_ascii_digit() || c == '.',
+                false => c != '/',
+            })
+        };
         self.begins[part] = at;
         let fits = match kind {
             Part::Letter(letter) => next == Some(letter) && self.fits(part + 1, at + 1),
-            Part::Field(_) => is_name && self.fits(part + 1, at + 1),
-            Part::Rest if self.fits(part + 1, at) => true,
-            Part::Rest => {
-                let fits = is_name && self.fits(part, at + 1);
+            Part::Field(name) => is_name(is_number(name)) && self.fits(part + 1, at + 1),
+            Part::Rest { .. } if self.fits(part + 1, at) => true,
+            Part::Rest { digits } => {
+                let fits = is_name(digits) && self.fits(part, at + 1);
                 // where it goes on is not where it begins
                 self.begins[part] = at;
                 fits
@@ -255,6 +339,7 @@ impl Match<'_> {
 /// anything but a slash.
 pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
     let mut parts = Vec::new();
+    let anything = Part::Rest { digits: false };
     let mut rest = pattern;
     while let Some(letter) = rest.chars().next() {
         let after = &rest[letter.len_utf8()..];
@@ -265,9 +350,14 @@ pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
         };
         rest = field.map_or(after, |(_, after)| after);
         match field {
-            Some(("", _)) => parts.push(Part::Rest),
-            Some((name, _)) => parts.extend([Part::Field(name), Part::Rest]),
-            None if letter == '*' => parts.push(Part::Rest),
+            Some(("", _)) => parts.push(anything),
+            Some((name, _)) => parts.extend([
+                Part::Field(name),
+                Part::Rest {
+                    digits: is_number(name),
+                },
+            ]),
+            None if letter == '*' => parts.push(anything),
             None => parts.push(Part::Letter(letter)),
         }
     }
@@ -283,15 +373,9 @@ pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
     }
     let mut named = Named::default();
     for (at, part) in found.parts.iter().enumerate() {
-        let value = || {
-            found.path[found.begins[at]..found.begins[at + 2]]
-                .iter()
-                .collect()
-        };
-        match part {
-            Part::Field("texture") => named.texture = value(),
-            Part::Field("session") => named.session = value(),
-            _ => {}
+        if let Part::Field(field) = part {
+            let value = &found.path[found.begins[at]..found.begins[at + 2]];
+            named.take(field, value.iter().collect())?;
         }
     }
     Some(named).filter(|named| !named.texture.is_empty())
@@ -324,6 +408,7 @@ pub(super) fn guessed(path: &str) -> Named {
     Named {
         texture: texture.unwrap_or_else(stem).to_owned(),
         session: session.to_owned(),
+        ..Named::default()
     }
 }
 
@@ -357,6 +442,28 @@ mod tests {
         assert_eq!(
             (named.texture.as_str(), named.session.as_str()),
             ("a", "b_c")
+        );
+        let named = matched("{texture}_*_{speed}_{force_mn}_*.*", "0_135_40.5_500_1.csv").unwrap();
+        assert_eq!(
+            (named.texture.as_str(), named.speed, named.force),
+            ("0", Some(40.5), Some(0.5))
+        );
+        let named = matched("{texture}_{speed}.csv", "raw_silk_40.csv").unwrap();
+        assert_eq!(
+            (named.texture.as_str(), named.speed),
+            ("raw_silk", Some(40.0))
+        );
+        assert_eq!(matched("{texture}_{speed}.csv", "silk_fast.csv"), None);
+        assert_eq!(matched("{texture}_{speed}.csv", "silk_4.5.6.csv"), None);
+        assert!(
+            check_pattern("{textur}_*.csv")
+                .unwrap_err()
+                .contains("{texture}, {session}")
+        );
+        assert!(
+            check_pattern("{session}/*")
+                .unwrap_err()
+                .contains("no {texture}")
         );
         let ends = matched("x{texture}", "xsilk").unwrap();
         assert_eq!(ends.texture, "silk");

@@ -41,41 +41,19 @@ pub fn words<'w>(words: impl Iterator<Item = &'w str>) -> Vec<u8> {
     array(&format!("<U{longest}"), &[words.len()], &data)
 }
 
-/// A `.npz` file of these arrays, each by its name: a zip archive whose files are not packed.
-pub fn zipped(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
-    let (mut file, mut list) = (Vec::new(), Vec::new());
+/// A `.npz` file of these arrays, each by its name.
+/// Errors: it is too large for one.
+#[cfg(feature = "files")]
+pub fn zipped(arrays: &[(&str, Vec<u8>)]) -> std::io::Result<Vec<u8>> {
+    use std::io::{Cursor, Write as _};
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    let options = options.compression_method(zip::CompressionMethod::Stored);
     for (name, array) in arrays {
-        let name = format!("{name}.npy");
-        let mut crc = flate2::Crc::new();
-        crc.update(array);
-        let size = (array.len() as u32).to_le_bytes();
-        // version 2.0, no flag, not packed, midnight of 1 January 1980
-        let mut about = vec![20, 0, 0, 0, 0, 0, 0, 0, 0x21, 0];
-        for part in [crc.sum().to_le_bytes(), size, size] {
-            about.extend(part);
-        }
-        about.extend((name.len() as u16).to_le_bytes());
-        about.extend([0, 0]);
-        list.extend(b"PK\x01\x02\x14\0");
-        list.extend(&about);
-        list.extend([0; 10]);
-        list.extend((file.len() as u32).to_le_bytes());
-        list.extend(name.as_bytes());
-        file.extend(b"PK\x03\x04");
-        file.extend(&about);
-        file.extend(name.as_bytes());
-        file.extend(array);
+        zip.start_file(format!("{name}.npy"), options)?;
+        zip.write_all(array)?;
     }
-    let (begin, length) = (file.len() as u32, list.len() as u32);
-    let number = (arrays.len() as u16).to_le_bytes();
-    file.extend(list);
-    file.extend(b"PK\x05\x06\0\0\0\0");
-    file.extend(number);
-    file.extend(number);
-    file.extend(length.to_le_bytes());
-    file.extend(begin.to_le_bytes());
-    file.extend([0, 0]);
-    file
+    Ok(zip.finish()?.into_inner())
 }
 
 /// The samples of a `.npy` file: little-endian 16-bit integers in one dimension, as `numpy.save` and [`write()`] make
@@ -181,72 +159,157 @@ impl<'b> Header<'b> {
     }
 }
 
-/// The channels of a `.npy` file of integers or floats, of either byte order: of one dimension one channel, of two the
-/// longer one is time. `fits` refuses more samples or channels than the caller takes.
-/// Errors: It is none, or refused.
-pub fn read_channels(
-    bytes: &[u8],
-    fits: impl Fn(usize, usize) -> Result<(), String>,
-) -> Result<Vec<Vec<f64>>, String> {
-    let header = Header::of(bytes)?;
-    let data = header.data;
-    let big = header.kind.starts_with('>');
-    let (rows, columns) = match header.shape[..] {
-        [samples] => (samples, 1),
-        [rows, columns] => (rows, columns),
-        _ => {
-            let dimensions = header.shape.len();
+/// An array of any shape.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Array {
+    /// Its shape.
+    pub shape: Vec<usize>,
+    /// Its elements as they lie in the file.
+    pub data: Elements,
+    fortran: bool,
+}
+
+/// The elements of an array.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Elements {
+    /// Integers, floats, or truth as 0 and 1.
+    Numbers(Vec<f64>),
+    /// Texts.
+    Words(Vec<String>),
+}
+
+impl Array {
+    /// The array of a `.npy` file of numbers or words, of either byte order.
+    /// Errors: It is none, or has more elements than `most`.
+    pub fn read(bytes: &[u8], most: usize) -> Result<Self, String> {
+        let fixed = |why: String| why.replace(FIX, "; save an array of numbers with numpy.save");
+        let header = Header::of(bytes).map_err(fixed)?;
+        let all = header
+            .shape
+            .iter()
+            .try_fold(1_usize, |n, side| n.checked_mul(*side));
+        let all = all.unwrap_or(usize::MAX);
+        if all > most {
             return Err(format!(
-                "an array of {dimensions} dimensions; save one or two"
+                "more than {} million numbers; split it",
+                most / 1_000_000
             ));
         }
-    };
-    // a recording is longer than it has channels
-    let by_row = rows >= columns || header.shape.len() == 1;
-    let (samples, channels) = if by_row {
-        (rows, columns)
-    } else {
-        (columns, rows)
-    };
-    macro_rules! elements {
-        ($number:ty) => {{
-            let (elements, rest) = data.as_chunks::<{ size_of::<$number>() }>();
-            if !rest.is_empty() || rows.checked_mul(columns) != Some(elements.len()) {
-                return Err("its header says another number of elements; save it again".to_owned());
-            }
-            fits(samples, channels)?;
-            let number = |sample: usize, channel: usize| {
-                // the first index is the slow one in C's order
-                let at = match by_row != header.fortran {
-                    true => sample * channels + channel,
-                    false => channel * samples + sample,
-                };
-                match big {
-                    true => <$number>::from_be_bytes(elements[at]) as f64,
-                    false => <$number>::from_le_bytes(elements[at]) as f64,
-                }
-            };
-            let channel = |channel| (0..samples).map(|sample| number(sample, channel)).collect();
-            (0..channels).map(channel).collect()
-        }};
+        Ok(Self {
+            data: header.elements(all)?,
+            shape: header.shape,
+            fortran: header.fortran,
+        })
     }
-    Ok(match header.kind.trim_start_matches(['<', '>', '|', '=']) {
-        "i1" => elements!(i8),
-        "u1" => elements!(u8),
-        "i2" => elements!(i16),
-        "u2" => elements!(u16),
-        "i4" => elements!(i32),
-        "u4" => elements!(u32),
-        "i8" => elements!(i64),
-        "u8" => elements!(u64),
-        "f4" => elements!(f32),
-        "f8" => elements!(f64),
-        kind => {
-            return Err(format!(
-                "an array of {kind:?}; save one of integers or floats"
-            ));
+
+    /// Its numbers, if it has such.
+    pub fn numbers(&self) -> Option<&[f64]> {
+        match &self.data {
+            Elements::Numbers(numbers) => Some(numbers),
+            Elements::Words(_) => None,
         }
-    })
+    }
+
+    /// Elements from one index of a dimension to the next.
+    pub fn strides(&self) -> Vec<usize> {
+        let dimensions = 0..self.shape.len();
+        let inner = |at: usize| match self.fortran {
+            true => &self.shape[..at],
+            false => &self.shape[at + 1..],
+        };
+        let product = |n: usize, side: &usize| n.saturating_mul(*side);
+        dimensions
+            .map(|at| inner(at).iter().fold(1, product))
+            .collect()
+    }
+}
+
+impl Header<'_> {
+    fn elements(&self, wanted: usize) -> Result<Elements, String> {
+        let kind = self.kind.trim_start_matches(['<', '>', '|', '=']);
+        let big = self.kind.starts_with('>');
+        macro_rules! numbers {
+            ($number:ty, $float:expr) => {{
+                let (elements, rest) = self.data.as_chunks::<{ size_of::<$number>() }>();
+                let number = |bytes: &[u8; size_of::<$number>()]| match big {
+                    true => $float(<$number>::from_be_bytes(*bytes)),
+                    false => $float(<$number>::from_le_bytes(*bytes)),
+                };
+                self.counted(elements.len(), rest, wanted)?;
+                Elements::Numbers(elements.iter().map(number).collect())
+            }};
+        }
+        Ok(match kind {
+            "b1" | "u1" => numbers!(u8, f64::from),
+            "i1" => numbers!(i8, f64::from),
+            "i2" => numbers!(i16, f64::from),
+            "u2" => numbers!(u16, f64::from),
+            "i4" => numbers!(i32, f64::from),
+            "u4" => numbers!(u32, f64::from),
+            "i8" => numbers!(i64, |x| x as f64),
+            "u8" => numbers!(u64, |x| x as f64),
+            "f2" => numbers!(u16, half),
+            "f4" => numbers!(f32, f64::from),
+            "f8" => numbers!(f64, f64::from),
+            kind => {
+                let letter = |bytes: &[u8; 4]| match big {
+                    true => u32::from_be_bytes(*bytes),
+                    false => u32::from_le_bytes(*bytes),
+                };
+                let wide = |word: &[u8]| {
+                    let letters = word.as_chunks::<4>().0.iter().map(letter);
+                    let letters = letters.take_while(|letter| *letter != 0);
+                    letters
+                        .map(|letter| char::from_u32(letter).unwrap_or('?'))
+                        .collect()
+                };
+                let narrow = |word: &[u8]| {
+                    let word = String::from_utf8_lossy(word);
+                    word.trim_end_matches('\0').to_owned()
+                };
+                let length = |rest: &str| rest.parse().ok().filter(|n| (1..1 << 20).contains(n));
+                match (kind.strip_prefix('U'), kind.strip_prefix('S')) {
+                    (Some(rest), _) => length(rest).map(|n| self.words(4 * n, wanted, wide)),
+                    (_, Some(rest)) => length(rest).map(|n| self.words(n, wanted, narrow)),
+                    _ => None,
+                }
+                .ok_or_else(|| {
+                    format!("an array of {kind:?}; save one of integers, floats or words (astype)")
+                })??
+            }
+        })
+    }
+
+    fn words(
+        &self,
+        bytes: usize,
+        wanted: usize,
+        word: impl Fn(&[u8]) -> String,
+    ) -> Result<Elements, String> {
+        let words = self.data.chunks_exact(bytes);
+        self.counted(words.len(), words.remainder(), wanted)?;
+        Ok(Elements::Words(words.map(word).collect()))
+    }
+
+    /// Refuses elements that are not as many as the shape says.
+    fn counted(&self, elements: usize, rest: &[u8], wanted: usize) -> Result<(), String> {
+        match rest.is_empty() && elements == wanted {
+            true => Ok(()),
+            false => Err("its header says another number of elements; save it again".to_owned()),
+        }
+    }
+}
+
+/// A float of 16 bits: a sign, 5 of exponent, 10 of fraction.
+fn half(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
+    sign * match exponent {
+        0 => fraction * 2_f64.powi(-14),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction) * 2_f64.powi(exponent - 15),
+    }
 }
 
 /// Samples from pairs of bytes, the low one first.

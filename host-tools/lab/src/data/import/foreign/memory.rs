@@ -126,6 +126,8 @@ fn named(one: &InMemory) -> Named {
     Named {
         texture: one.texture.clone(),
         session: one.session.clone(),
+        run: one.run.clone(),
+        ..Named::default()
     }
 }
 
@@ -142,15 +144,4 @@ pub(super) fn find<'m>(all: &'m Arc<[InMemory]>, path: &str) -> Result<&'m Signa
     let found = place(path).and_then(|at| all.get(at));
     let found = found.ok_or_else(|| RecordingError::at(path.as_ref(), "there is no such array"));
     Ok(&found?.signals)
-}
-
-/// The run of a recording; each is one of its own, unless it is known.
-pub(super) fn run(all: &Arc<[InMemory]>, path: &str) -> String {
-    let known = place(path).and_then(|at| all.get(at));
-    let known = known.map(|one| one.run.clone()).unwrap_or_default();
-    if known.is_empty() {
-        path.to_owned()
-    } else {
-        known
-    }
 }

@@ -1,9 +1,12 @@
 //! The files below a folder, and what their paths say.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use super::columns::{no_channel, time};
+use crate::data::import::on_line;
 use crate::data::import::settings::{Named, Settings, guessed, matched};
+use crate::data::import::signals::Signals;
 use crate::data::recordings::{RecordingError, Result};
 
 /// Deepest folder below the one that is imported.
@@ -11,7 +14,9 @@ const DEPTH: usize = 8;
 /// Most files of one import.
 const MOST_FILES: usize = 100_000;
 /// Endings of files that are data; others are left alone.
-const ENDINGS: [&str; 6] = ["wav", "csv", "tsv", "txt", "npy", "dat"];
+const ENDINGS: [&str; 11] = [
+    "wav", "wave", "csv", "tsv", "txt", "dat", "log", "lvm", "npy", "npz", "mcap",
+];
 
 /// The files to import, by their paths below the folder, and what these say, in their natural order.
 pub(super) fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Named)>> {
@@ -25,12 +30,13 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Nam
         paths.extend(name);
     }
     paths.sort_by_cached_key(|path| natural(path));
-    let pattern = settings
-        .texture
-        .as_ref()
-        .filter(|texture| texture.contains(['{', '*']));
+    let pattern = settings.pattern();
     let named = paths.into_iter().filter_map(|path| {
         let named = match pattern {
+            // without a folder it is one of names
+            Some(pattern) if !pattern.contains('/') => {
+                matched(pattern, path.rsplit('/').next().unwrap_or(&path))?
+            }
             Some(pattern) => matched(pattern, &path)?,
             None => guessed(&path),
         };
@@ -45,6 +51,79 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Nam
         return Err(RecordingError::at(from, why));
     }
     Ok(named)
+}
+
+/// The folder of accelerations in the Cluster Haptic Texture Dataset (Eguchi et al., arXiv 2407.16206), as CSV:
+/// `sensor_data/accel/TEXTURE_DIRECTION_SPEED_FORCE_REPEAT.csv`, with the same names below `sensor_data/force`.
+fn cluster(from: &Path) -> Option<PathBuf> {
+    let is_one = |name: &str| {
+        let parts = name.strip_suffix(".csv").map(|stem| stem.split('_'));
+        parts.is_some_and(|mut parts| {
+            parts.clone().count() == 5 && parts.all(|part| part.parse::<u32>().is_ok())
+        })
+    };
+    let folders = ["sensor_data/accel", "accel"].map(|below| from.join(below));
+    folders.into_iter().find(|folder| {
+        let mut names = fs::read_dir(folder).into_iter().flatten().flatten();
+        names.any(|entry| is_one(&entry.file_name().to_string_lossy()))
+    })
+}
+
+/// The folder of what is imported.
+pub(super) fn folder_of(from: &Path) -> &Path {
+    match from.is_dir() {
+        true => from,
+        // of a name alone it is the folder that one is in
+        false => from
+            .parent()
+            .filter(|parent| !parent.as_os_str().is_empty())
+            .unwrap_or(Path::new(".")),
+    }
+}
+
+/// The settings of a published data set that is known, and the folder of its files.
+pub(super) fn known_layout(from: &Path, mut settings: Settings) -> (PathBuf, Settings) {
+    let Some(folder) = cluster(from) else {
+        return (from.to_owned(), settings);
+    };
+    let set = |setting: &mut Option<String>, to: &str| {
+        setting.get_or_insert_with(|| to.to_owned());
+    };
+    set(
+        &mut settings.texture,
+        "{texture}_*_{speed}_{force_mn}_*.csv",
+    );
+    set(&mut settings.finger, "cluster-haptic-texture");
+    set(&mut settings.unit, "g");
+    set(&mut settings.pressure, BESIDE);
+    (folder, settings)
+}
+
+/// The folder beside that of a file, and the column of a file of the same name in it, that are read with it.
+pub(super) const BESIDE: &str = "force";
+
+/// Adds the column of the file beside one that belongs to it, at its times.
+pub(super) fn add(signals: &mut Signals, beside: &Path, settings: &Settings) -> Result<()> {
+    if signals.channel(BESIDE).is_some() || !beside.is_file() {
+        return Ok(());
+    }
+    let other = Signals::read(beside)?;
+    let at = |why: String| RecordingError::at(beside, why);
+    let own = time(signals, settings).map_err(at)?;
+    let times = time(&other, settings).map_err(at)?;
+    let (Some(own), Some(times)) = (own, times) else {
+        return Err(at(
+            "no column of time in it, or in the file beside it".to_owned()
+        ));
+    };
+    let force = other
+        .channel(BESIDE)
+        .ok_or_else(|| at(no_channel(&other, BESIDE)))?;
+    let force = times.times.into_iter().zip(force.1.iter().copied());
+    let force: Vec<(f64, f64)> = force.collect();
+    let values = on_line(&force, &own.times).collect();
+    signals.channels.push((BESIDE.to_owned(), values));
+    Ok(())
 }
 
 fn walk(folder: &Path, below: &str, depth: usize, paths: &mut Vec<String>) -> Result<()> {

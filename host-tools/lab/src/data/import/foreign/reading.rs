@@ -1,24 +1,18 @@
 //! How the samples of a file are read: its rate, its channel, its slides.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
+use tactus_core::features::Movement;
+
+use super::columns::{Time, names, no_channel, rate_of, time};
 use super::{Found, SLOW_HZ, STILL, WIDTH};
 use crate::data::import::cut::{Parts, parts};
 use crate::data::import::resample::{RATES_HZ, resample};
 use crate::data::import::settings::{Named, Settings};
-use crate::data::import::signals::Signals;
+use crate::data::import::signals::{Piece, Signals};
 use crate::data::recording::PAC_RATE_HZ;
 
-/// Names of columns of time.
-const TIMES: [&str; 7] = [
-    "time",
-    "t",
-    "timestamp",
-    "seconds",
-    "sec",
-    "elapsed",
-    "zeit",
-];
 /// Samples of the slides into which longer sliding is divided: 3 s, and what a slow sensor can have in 20 s.
 const LENGTH: usize = 6600;
 const SLOW_LENGTH: usize = 2000;
@@ -28,38 +22,50 @@ pub(super) struct How {
     pub(super) rate_hz: f64,
     /// the rate that the signal is resampled from; `None` where a sample stays a sample
     from_hz: Option<u32>,
+    /// the column of time, and its unit that nothing says
+    pub(super) unit: Option<(String, &'static str)>,
+    /// before which samples some are missing
+    gaps: Vec<usize>,
 }
 
 impl How {
-    pub(super) fn new(signals: &Signals, settings: &Settings) -> std::result::Result<Self, String> {
-        let timed = time(signals, settings)?
-            .map(|(_, times)| rate_of(&times))
-            .transpose()?;
-        let rate = settings
-            .rate
-            .or(signals.rate_hz)
-            .or(timed.map(|(rate, _)| rate));
-        let Some(rate_hz) = rate else {
-            let columns: Vec<&str> = signals
-                .channels
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
+    pub(super) fn new(signals: &Signals, settings: &Settings) -> Result<Self, String> {
+        let time = time(signals, settings)?;
+        let timed = time.as_ref().map(|time| rate_of(&time.times)).transpose();
+        // a rate that is given takes the place of a time that stands
+        let timed = match timed {
+            Err(why) if settings.rate.is_none() => return Err(why),
+            timed => timed.unwrap_or_default(),
+        };
+        let (timed, gaps) = timed.unzip();
+        let Some(rate_hz) = settings.rate.or(timed).or(signals.rate_hz) else {
             return Err(format!(
                 "no rate: give --rate HZ, or --time COLUMN; the columns of numbers are {}",
-                columns.join(", ")
+                names(signals)
             ));
         };
         if !(1.0..=*RATES_HZ.end()).contains(&rate_hz) {
             return Err(format!(
-                "a rate of {rate_hz} Hz; it is 1 to {} Hz. Is the time in s? Its column's name may say ms or us",
+                "a rate of {rate_hz} Hz; it is 1 to {} Hz. Is the time in s? Its column's name may say ms or us, or \
+                 give --rate HZ",
                 RATES_HZ.end()
             ));
         }
         let from_hz = RATES_HZ
             .contains(&rate_hz)
             .then_some(rate_hz.round() as u32);
-        Ok(Self { rate_hz, from_hz })
+        let unit = |time: Time| Some((time.name, time.guessed?));
+        Ok(Self {
+            rate_hz,
+            from_hz,
+            unit: time.and_then(unit).filter(|_| settings.rate.is_none()),
+            gaps: gaps.unwrap_or_default(),
+        })
+    }
+
+    /// True if a file is of the same kind of sensor as another.
+    pub(super) fn is_like(&self, first: &Self) -> bool {
+        (self.rate_hz / first.rate_hz - 1.0).abs() <= 0.02
     }
 
     pub(super) fn look(
@@ -69,26 +75,17 @@ impl How {
         signals: &Signals,
         channel: &str,
         settings: &Settings,
-    ) -> std::result::Result<Vec<Found>, String> {
-        let own = Self::new(signals, settings)?;
-        if (own.rate_hz / self.rate_hz - 1.0).abs() > 0.02 {
-            return Err(format!(
-                "{:.1} Hz, and the first file has {:.1} Hz: import files of one kind at a time, chosen by --texture \
-                 \"{{texture}}/*_imu.csv\" and the like",
-                own.rate_hz, self.rate_hz
-            ));
-        }
-        let all = self::channel(signals, channel)?;
+    ) -> Result<Vec<Found>, String> {
+        let (name, all) = self::channel(signals, channel)?;
         if self.samples(all.len()) > MOST_SAMPLES {
             let hours = self.samples(all.len()) / self.out_hz() / 3600.0;
             return Err(format!("{hours:.1} h in one file; split it"));
         }
-        let gaps = match time(signals, settings)? {
-            Some((_, times)) => rate_of(&times)?.1,
-            None => Vec::new(),
-        };
-        let stretches = stretches(signals, settings, named, all.len())?.into_iter();
-        let found = stretches.map(|(texture, rows)| {
+        let missing = signals.missing.get(name).into_iter().flatten();
+        let mut gaps: Vec<usize> = missing.chain(&self.gaps).copied().collect();
+        gaps.sort_unstable();
+        let stretches = stretches(signals, settings, (path, named), all.len())?.into_iter();
+        let found = stretches.map(|(named, rows)| {
             // a stretch that is too short for a slide is not looked at: of a column of words there may be many
             let (out, mut ranges) = if self.samples(rows.len()) < LEAST as f64 {
                 (about(&all[rows.clone()]), Parts::default())
@@ -99,26 +96,34 @@ impl How {
             };
             let there = ranges.slides.len();
             let scale = out.len() as f64 / rows.len() as f64;
-            let inside = gaps.iter().filter_map(|gap| gap.checked_sub(rows.start));
-            let inside: Vec<usize> = inside.map(|gap| (gap as f64 * scale) as usize).collect();
-            ranges
-                .slides
-                .retain(|range| !inside.iter().any(|gap| range.contains(gap)));
+            let place = |row: usize| gaps.partition_point(|gap| *gap < row);
+            // a gap before all of a stretch is not in it
+            let inside =
+                gaps[place(rows.start + 1)..place(rows.end).max(place(rows.start + 1))].iter();
+            let inside = inside.map(|gap| ((gap - rows.start) as f64 * scale) as usize);
+            let inside: Vec<usize> = inside.collect();
+            ranges.slides.retain(|range| {
+                let first = inside.partition_point(|gap| *gap < range.start);
+                inside.get(first).is_none_or(|gap| *gap >= range.end)
+            });
             let part = |at: usize| at as f32 / out.len() as f32;
             let slides = ranges.slides.iter();
-            let session = settings.session.as_ref().unwrap_or(&named.session);
             Ok(Found {
                 path: path.to_owned(),
-                texture,
-                session: session.clone(),
+                movement: movement(&named, settings)?,
+                texture: named.texture,
+                session: named.session,
+                run: named.run,
                 seconds: rows.len() as f64 / self.rate_hz,
                 envelope: envelope(&out),
                 slides: slides.map(|r| (part(r.start), part(r.end))).collect(),
                 gaps: there - ranges.slides.len(),
                 still: ranges.still.is_some(),
                 peak: out.iter().fold(0.0, |most: f64, x| most.max(x.abs())),
+                short: (self.samples(rows.len()) < LEAST as f64)
+                    .then(|| LEAST as f64 / self.out_hz()),
                 pressure: match &settings.pressure {
-                    Some(column) => span(&self::channel(signals, column)?[rows.clone()]),
+                    Some(column) => span(&self::channel(signals, column)?.1[rows.clone()]),
                     None => 0.0,
                 },
                 rows,
@@ -129,7 +134,7 @@ impl How {
     }
 
     /// Where the settings say that the finger slides, or where it seems to.
-    fn ranges(&self, out: &[f64], settings: &Settings) -> std::result::Result<Parts, String> {
+    fn ranges(&self, out: &[f64], settings: &Settings) -> Result<Parts, String> {
         let length = match (settings.length, self.from_hz) {
             (Some(seconds), _) => (seconds * self.out_hz()) as usize,
             (None, Some(_)) => LENGTH,
@@ -201,8 +206,8 @@ impl How {
         column: &str,
         found: &Found,
         gain: f64,
-    ) -> std::result::Result<Vec<i16>, String> {
-        let all = channel(signals, column)?;
+    ) -> Result<Vec<i16>, String> {
+        let (_, all) = channel(signals, column)?;
         let values = all.get(found.rows.clone()).unwrap_or_default();
         let each = self.rate_hz * self.stretch() / f64::from(SLOW_HZ);
         let samples = (values.len() as f64 / each).ceil() as usize;
@@ -223,43 +228,131 @@ fn about(samples: &[f64]) -> Vec<f64> {
     samples.iter().map(|x| x - mean).collect()
 }
 
-/// The samples of a channel.
-fn channel<'s>(signals: &'s Signals, wanted: &str) -> std::result::Result<&'s [f64], String> {
-    signals
-        .channel(wanted)
-        .map(|(_, samples)| samples.as_slice())
-        .ok_or_else(|| {
-            let names: Vec<&str> = signals
-                .channels
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
-            format!("no channel {wanted:?}; there are {}", names.join(", "))
-        })
+/// A channel: its whole name, and its samples.
+fn channel<'s>(signals: &'s Signals, wanted: &str) -> Result<(&'s str, &'s [f64]), String> {
+    let found = signals.channel(wanted);
+    found
+        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
+        .ok_or_else(|| no_channel(signals, wanted))
 }
 
-/// The textures of a file: its own, or those that a column of words names, each with its rows.
+/// The movement that a path or the settings say.
+fn movement(named: &Named, settings: &Settings) -> Result<Movement, String> {
+    let (force, speed) = (
+        named.force.or(settings.force),
+        named.speed.or(settings.speed),
+    );
+    match (force, speed) {
+        (None, None) => Ok(Movement::UNKNOWN),
+        (Some(force), Some(speed)) => Movement::from_si(force, speed).map_err(|why| {
+            format!("{why}; without force and speed the movement is unknown, which is allowed")
+        }),
+        (Some(_), None) => Err("only the force is known: give --speed, too, or neither".to_owned()),
+        (None, Some(_)) => Err("only the speed is known: give --force, too, or neither".to_owned()),
+    }
+}
+
+/// Words, each with the row behind its last one in a row; `None` where no column says them.
+type Runs<'s> = Option<Cow<'s, [(String, usize)]>>;
+
+/// The columns of the texture and of the session.
+fn labels<'s>(signals: &'s Signals, settings: &Settings) -> Result<[Runs<'s>; 2], String> {
+    let runs = |column: &String| {
+        let runs = signals.runs(column)?;
+        Some(match runs.is_empty() {
+            true => Err(format!(
+                "column {column:?} has too many words for names of textures or sessions; name another"
+            )),
+            false => Ok(runs),
+        })
+    };
+    let column = settings
+        .texture
+        .as_ref()
+        .filter(|_| settings.pattern().is_none());
+    let textures = column.map(|column| {
+        runs(column).unwrap_or_else(|| {
+            let words = signals.words.iter().map(|(name, _)| name.as_str());
+            let words: Vec<&str> = words.collect();
+            let words = if words.is_empty() {
+                "none".to_owned()
+            } else {
+                words.join(", ")
+            };
+            Err(format!(
+                "{}; the columns of words are {words}",
+                no_channel(signals, column)
+            ))
+        })
+    });
+    let textures = textures.transpose()?;
+    let sessions = settings.session.as_ref().and_then(runs).transpose()?;
+    Ok([textures, sessions])
+}
+
+/// The recordings in a file with their rows: those that it tells apart, or where a column says another texture or
+/// session.
 fn stretches(
     signals: &Signals,
     settings: &Settings,
-    named: &Named,
+    (path, named): (&str, &Named),
     rows: usize,
-) -> std::result::Result<Vec<(String, Range<usize>)>, String> {
-    let column = settings.texture.as_ref();
-    let Some(column) = column.filter(|texture| !texture.contains(['{', '*'])) else {
-        return Ok(vec![(named.texture.clone(), 0..rows)]);
+) -> Result<Vec<(Named, Range<usize>)>, String> {
+    let [textures, sessions] = labels(signals, settings)?;
+    let both = [&textures, &sessions].into_iter().flatten();
+    let mut cuts: Vec<usize> = both
+        .flat_map(|runs| runs.iter().map(|(_, end)| *end))
+        .collect();
+    cuts.sort_unstable();
+    cuts.dedup();
+    let whole = [Piece {
+        rows: 0..rows,
+        ..Piece::default()
+    }];
+    let pieces = if signals.pieces.is_empty() {
+        &whole[..]
+    } else {
+        &signals.pieces
     };
-    let words = signals.words.iter().find(|(name, _)| name == column);
-    let (_, words) = words.ok_or_else(|| format!("no column of words {column:?}"))?;
-    if words.is_empty() {
-        return Err(format!(
-            "column {column:?} has too many words for names of textures; name another by --texture"
-        ));
+    let mut found = Vec::new();
+    for piece in pieces {
+        let Range { mut start, end } = piece.rows.clone();
+        let inside =
+            cuts.partition_point(|cut| *cut <= start)..cuts.partition_point(|cut| *cut < end);
+        for end in cuts[inside.start..inside.end.max(inside.start)]
+            .iter()
+            .copied()
+            .chain([end])
+        {
+            let at = |runs: &Runs<'_>| {
+                let runs = runs.as_ref()?;
+                let run = runs.get(runs.partition_point(|(_, behind)| *behind <= start))?;
+                Some(run.0.clone())
+            };
+            let texture = at(&textures).or_else(|| piece.texture.clone());
+            let session = at(&sessions).or_else(|| settings.session.clone());
+            let session = session.or_else(|| piece.session.clone());
+            let run = || {
+                if named.run.is_empty() {
+                    path
+                } else {
+                    &named.run
+                }
+                .to_owned()
+            };
+            let own = Named {
+                texture: texture.unwrap_or_else(|| named.texture.clone()),
+                session: session.unwrap_or_else(|| named.session.clone()),
+                run: piece.run.clone().unwrap_or_else(run),
+                ..named.clone()
+            };
+            if !own.texture.trim().is_empty() && start < end {
+                found.push((own, start..end));
+            }
+            start = end;
+        }
     }
-    let begins = [0].into_iter().chain(words.iter().map(|(_, end)| *end));
-    let runs = words.iter().zip(begins);
-    let runs = runs.map(|((word, end), begin)| (word.clone(), begin..*end));
-    Ok(runs.filter(|(word, _)| !word.is_empty()).collect())
+    Ok(found)
 }
 
 /// The largest value of a signal that changes, else 0.
@@ -277,86 +370,6 @@ fn span(values: &[f64]) -> f64 {
 pub(super) const LEAST: usize = 1100;
 /// Most samples of P_AC of a file: two hours.
 const MOST_SAMPLES: f64 = 7200.0 * PAC_RATE_HZ as f64;
-
-/// The file's column of time, in s.
-fn time(
-    signals: &Signals,
-    settings: &Settings,
-) -> std::result::Result<Option<(String, Vec<f64>)>, String> {
-    let is_time = |name: &str| {
-        let name = name.to_lowercase();
-        let word = name.split(['_', ' ', '(', '[']).next().unwrap_or_default();
-        TIMES.contains(&word)
-    };
-    let column = match &settings.time {
-        Some(time) => Some(
-            signals
-                .channel(time)
-                .ok_or_else(|| format!("no column {time:?}"))?,
-        ),
-        None => signals.channels.iter().find(|(name, _)| is_time(name)),
-    };
-    Ok(column.map(|(name, values)| {
-        let lower = name.to_lowercase();
-        let has = |unit: &str| {
-            lower
-                .split(|c: char| !c.is_alphanumeric())
-                .any(|part| part == unit)
-        };
-        let unit = match () {
-            () if has("ns") => 1e-9,
-            () if has("us") || has("µs") => 1e-6,
-            () if has("ms") => 1e-3,
-            () => 1.0,
-        };
-        (name.clone(), values.iter().map(|t| t * unit).collect())
-    }))
-}
-
-/// Samples per second by their times, and before which of them some are missing.
-fn rate_of(times: &[f64]) -> std::result::Result<(f64, Vec<usize>), String> {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let gaps = steps.clone();
-    steps.sort_by(f64::total_cmp);
-    let middle = steps[steps.len() / 2];
-    if middle <= 0.0 {
-        return Err("its time does not go on; give --rate HZ instead".to_owned());
-    }
-    // samples that came in bursts have the right mean, and the median of a clock that jumps is not moved by it
-    let usual: Vec<f64> = gaps
-        .iter()
-        .copied()
-        .filter(|s| (0.0..3.0 * middle).contains(s))
-        .collect();
-    let mean = usual.iter().sum::<f64>() / usual.len() as f64;
-    let jumps = gaps
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| !(0.0..=3.0 * middle).contains(*s));
-    Ok((1.0 / mean, jumps.map(|(at, _)| at + 1).collect()))
-}
-
-/// The channel that changes most from sample to sample, in parts of its range.
-pub(super) fn liveliest(
-    signals: &Signals,
-    settings: &Settings,
-) -> std::result::Result<String, String> {
-    let time = time(signals, settings)?.map(|(name, _)| name);
-    let slow = [&time, &settings.pressure, &settings.shear];
-    let others = signals
-        .channels
-        .iter()
-        .filter(|(name, _)| !slow.contains(&&Some(name.clone())));
-    let energy = |samples: &[f64]| {
-        samples
-            .windows(2)
-            .map(|p| (p[1] - p[0]).powi(2))
-            .sum::<f64>()
-    };
-    let best = others.max_by(|(_, a), (_, b)| energy(a).total_cmp(&energy(b)));
-    best.map(|(name, _)| name.clone())
-        .ok_or_else(|| "no column of numbers beside the time".to_owned())
-}
 
 /// Two digits, rounded down.
 pub(super) fn rounded(gain: f64) -> f64 {
