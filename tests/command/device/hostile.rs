@@ -167,6 +167,7 @@ fn what_is_not_of_the_probes_table_is_never_printed() {
             slides,
             wants_label: false,
             changed: false,
+            most_like: false,
         })
     };
     let known = whole.name(3).unwrap();

@@ -53,6 +53,10 @@ pub(crate) struct Args {
     /// early then. The image tactus-rig takes such a table, the others refuse it
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
+    /// Leave out what only a PC needs, the note of the slides, and how the table does with new textures: a shorter table,
+    /// which tells names without asking whether a new texture would get them
+    #[arg(long)]
+    plain: bool,
     /// The file to write; "-": standard output
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -111,9 +115,13 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let bytes = with_lengths(args, &set, bytes, &expected)?;
     let taught = taught(&set, &measured, args.train_slides)?;
     let tables = open_set::tables(&taught) as u64;
-    let bytes = with_progress(tables, "leaving textures out", |done| {
-        open_set::with_figures(bytes, &expected, &taught, done)
-    })?;
+    let bytes = if args.plain {
+        tactus_link::for_probe(&Table::read(&bytes)?)
+    } else {
+        with_progress(tables, "leaving textures out", |done| {
+            open_set::with_figures(bytes, &expected, &taught, done)
+        })?
+    };
     write_file(&args.out, &bytes, args.force)?;
     let out = &mut beside(&args.out, out);
     let learned = learned_textures(&set, &measured)?;
@@ -155,7 +163,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             "Fewer than {wanted} slides at a movement have {short}, {fewest} at least: all of them are learned from."
         )?;
     }
-    if !Table::read(&bytes)?.learned_slides().all {
+    if !args.plain && !Table::read(&bytes)?.learned_slides().all {
         writeln!(
             out,
             "It notes {MAX_LEARNED} of the slides that it was learned from, and not the others."

@@ -59,7 +59,8 @@ fn make(work: &Path, finger: &str, names: &[&str]) -> Result<Vec<Vec<u8>>> {
             learn.arg("learn-by-hand").args(world);
             learn.args(["--trials", SLIDES_BY_HAND]);
         } else {
-            learn.args(["learn", "--train-slides", TRIALS, "--recordings"]);
+            learn.args(["learn", "--plain", "--train-slides", TRIALS]);
+            learn.arg("--recordings");
             learn.arg(&recordings);
         }
         if name.starts_with("arm") {
