@@ -35,9 +35,10 @@ impl OpenSet {
     /// Bytes that the section takes, kind and length included.
     pub const LENGTH: usize = 4 + 3 * 12;
 
-    /// Whether so few new textures get a name that a name may be told as sure.
+    /// Returns whether a name may be told as sure: it is not certain that too many new textures get one. The share of a
+    /// few textures says little by itself: of twenty, four may be chance.
     pub fn may_name(&self) -> bool {
-        self.new_named.share <= MOST_NAMED
+        self.new_named.low <= MOST_NAMED
     }
 
     fn shares(&self) -> [Share; 3] {

@@ -205,11 +205,13 @@ impl Judge {
             .fold(f64::INFINITY, f64::min);
         let turned = times(&self.axes, z);
         let each = turned.iter().zip(&self.centre).zip(&self.spread);
-        let new = each.map(|((z, b), lambda)| {
+        let [volume, distance] = each.fold([0.0; 2], |[volume, distance], ((z, b), lambda)| {
             let v = lambda + 1.0 / k as f64;
-            v.ln() + (z - b).powi(2) / v
+            [volume + v.ln(), distance + (z - b).powi(2) / v]
         });
-        least - 0.5 * new.sum::<f64>()
+        // what is unlike everything is no likelier for it
+        let d = z.len() as f64;
+        least - 0.5 * (volume + distance.min(d + 2.0 * (2.0 * d).sqrt()))
     }
 
     fn calibrate(

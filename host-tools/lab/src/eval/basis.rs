@@ -7,7 +7,6 @@ use tactus_core::table::{Contents, Table, encoded_len};
 
 use super::learn::Slides;
 use super::show::count;
-use crate::sim::flash::TABLE;
 
 /// Largest difference between slides of one texture at which a feature is constant, in steps: a count of P_DC, and
 /// what rounding adds. A feature that never moves measures nothing, and any change of it later would look like a new
@@ -39,6 +38,8 @@ pub fn best_features(slides: &Slides) -> FeatureSet {
         .unwrap_or(FeatureSet::Bands)
 }
 
+/// Bytes of a table that fits into a probe with all its sections: most of 64 KB.
+const ROOM: usize = 56 << 10;
 /// So many degrees of freedom of the scatter within textures are needed for each feature of a set with all bands: with
 /// fewer, coarse bands are wrong less often. The table must fit into a probe, with its sections.
 const FREEDOM: usize = 2;
@@ -63,7 +64,7 @@ pub fn length(set: FeatureSet, slides: &Slides) -> usize {
     let fewest = (0..movements).map(freedom).min().unwrap_or(0);
     let features = set.others() + all;
     let contents = Contents::Fused(set, features as u8);
-    let fits = encoded_len(contents, slides.len(), movements, 0) <= TABLE / 8 * 7;
+    let fits = encoded_len(contents, slides.len(), movements, 0) <= ROOM;
     if all == coarse || fits && fewest >= FREEDOM * features {
         features
     } else {
