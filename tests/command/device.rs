@@ -132,6 +132,21 @@ fn a_session_does_what_was_meant() {
 }
 
 #[test]
+#[ignore = "writes tests/golden/identify.jsonl.gz anew"]
+fn the_golden_log_of_an_exploration() {
+    let bench = Bench::new(1000);
+    bench.printed("identify --learn --seed 5 --log log");
+    let golden = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/golden/identify.jsonl.gz"
+    );
+    let file = std::fs::File::create(golden).unwrap();
+    let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::best());
+    packed.write_all(&bench.at.read("log")).unwrap();
+    packed.finish().unwrap();
+}
+
+#[test]
 fn every_decision_of_a_session_is_computed_again_from_its_log() {
     let bench = Bench::new(1000);
     let identify = "identify --threshold 1 --max-slides 3 --seed 7 --method fused-random --log log";
