@@ -371,6 +371,40 @@ fn a_robots_terrains_are_imported_and_evaluated_as_the_page_says() {
     assert!(share("right") > 0.5 && share("wrong") < 0.12, "{told}");
 }
 
+/// One recording that was cut into two files is one slide, whatever the rate, and whatever the second is called.
+#[test]
+fn a_copy_that_is_shifted_is_left_out_and_named() {
+    for (rate, first, second) in [
+        (44_100, "cork/1.wav", "cork/1 again.wav"),
+        (2200, "cork/1.wav", "suede/3.wav"),
+        (180, "cork/2.wav", "silk/0.wav"),
+    ] {
+        let at = Scratch::new();
+        each(
+            f64::from(rate),
+            2200.0 / f64::from(rate.max(2200)),
+            |name, number, x| {
+                at.write(&format!("data/{name}/{number}.wav"), wav(rate, 16, &[x]));
+            },
+        );
+        let whole = at.read(&format!("data/{first}"));
+        // a fifth of the slide is missing
+        let from = 44 + whole.len() / 2 * 33 / 100 / 2 * 2;
+        let mut copy = wav(rate, 16, &[&vec![0.0; (whole.len() - from) / 2]]);
+        copy.truncate(44);
+        copy.extend(&whole[from..]);
+        at.write(&format!("data/{second}"), copy);
+        let said = at.printed("import data recordings");
+        let left_out = said.lines().filter(|line| line.starts_with("left out: "));
+        let left_out: Vec<&str> = left_out.collect();
+        // those of a slow clock are divided
+        assert_eq!(left_out.len(), if rate == 180 { 2 } else { 1 }, "{said}");
+        for line in left_out {
+            assert_says(line, &["% of its P_AC is that of slide ", first, second]);
+        }
+    }
+}
+
 /// Whatever files and settings say, one sentence says what is wrong, and nothing is written.
 #[test]
 fn hostile_files_settings_and_names_are_refused() {

@@ -108,8 +108,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 /// All files of a study, by their names.
 fn files(study: &Study) -> BTreeMap<String, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
-    report::prepare(folder.path()).unwrap();
-    report::write(study, folder.path()).unwrap();
+    report::write(study, &mut report::prepare(folder.path()).unwrap()).unwrap();
     let all = fs::read_dir(folder.path()).unwrap().map(|entry| {
         let entry = entry.unwrap();
         (

@@ -34,6 +34,7 @@ pub use port::Port;
 pub use probe::Probe;
 pub use request::{Identified, Request};
 pub use session::{LinkError, MAX_TRIES, Session};
+pub use sound::foreign;
 pub use table::{PushTable, ReadTable, checksum, for_probe};
 pub use transaction::{Job, Transaction};
 

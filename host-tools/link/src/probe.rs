@@ -193,7 +193,7 @@ impl State {
             self.came.1 += reports.len() as u64;
             match polled {
                 Poll::Ready(Err(LinkError::Disturbed)) if self.came.1 == 0 => {
-                    return Err(PortError::Garbage(self.came.0));
+                    return Err(self.garbage());
                 }
                 Poll::Ready(outcome) => return Ok(Poll::Ready(outcome?)),
                 // bytes without end that are no report are as good as silence
@@ -206,7 +206,7 @@ impl State {
             match job.repeat(&mut self.session, &mut self.send) {
                 Ok(true) => self.heard = self.now,
                 Ok(false) | Err(LinkError::Disturbed) if garbage => {
-                    return Err(PortError::Garbage(self.came.0));
+                    return Err(self.garbage());
                 }
                 Ok(false) => return Err(PortError::Silent(self.greeting)),
                 Err(LinkError::Disturbed) => {
@@ -216,6 +216,13 @@ impl State {
             }
         }
         Ok(Poll::Pending)
+    }
+
+    fn garbage(&self) -> PortError {
+        match self.session.is_echo() {
+            true => LinkError::Echo.into(),
+            false => PortError::Garbage(self.came.0),
+        }
     }
 
     /// Ends a request that is under way for too long.

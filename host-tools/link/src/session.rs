@@ -94,6 +94,20 @@ fn quoted(words: &Option<String>) -> String {
         .unwrap_or_default()
 }
 
+/// Bytes that are compared.
+const COMPARED: usize = 1024;
+/// Fewest bytes that are no accident.
+const LEAST_ECHO: usize = 8;
+
+/// Notes bytes as a line carries them that has seven bits and takes no zeros.
+fn carry(to: &mut Vec<u8>, bytes: &[u8]) {
+    let bytes = bytes
+        .iter()
+        .map(|byte| byte & 0x7f)
+        .filter(|byte| *byte != 0);
+    to.extend(bytes.take(COMPARED.saturating_sub(to.len())));
+}
+
 /// Requests get their numbers here, and received bytes become reports.
 #[derive(Debug, Default)]
 pub struct Session {
@@ -106,6 +120,8 @@ pub struct Session {
     missing: u64,
     /// understands what a host says
     echo: Receiver,
+    /// What was sent, and what came, as the poorest line carries it; each up to [`COMPARED`].
+    carried: [Vec<u8>; 2],
     /// Why nothing that comes in can be believed.
     pub(crate) refused: Option<LinkError>,
 }
@@ -119,12 +135,21 @@ impl Session {
         self.next_id = id.wrapping_add(1);
         send.push(0);
         send.extend_from_slice(frame);
+        carry(&mut self.carried[0], frame);
         Ok(id)
+    }
+
+    /// Returns true if all that came are bytes that were sent, in their order: an echo, though no frame of it is whole.
+    pub(crate) fn is_echo(&self) -> bool {
+        let [sent, came] = &self.carried;
+        let mut sent = sent.iter();
+        came.len() >= LEAST_ECHO && came.iter().all(|byte| sent.any(|other| other == byte))
     }
 
     /// Takes in bytes as they come; the reports that end in them. One that cannot be is counted as damaged.
     pub fn receive(&mut self, bytes: &[u8]) -> Vec<Report> {
         let mut reports = Vec::new();
+        carry(&mut self.carried[1], bytes);
         for &byte in bytes {
             let echo = self.echo.push::<wire::Request>(byte);
             match self.receiver.push::<Report>(byte) {

@@ -1,10 +1,13 @@
 //! Reports that no probe makes: they pass the checksum, and nothing of them is believed or shown.
 
-use tactus_core::table::{self, MAX_MOVEMENTS, MAX_TEXTURES, is_false_alarm, valid_name};
+use tactus_core::sensor::pressure::RATE_HZ;
+use tactus_core::table::{self, MAX_MOVEMENTS, MAX_TEXTURES, Table, is_false_alarm, valid_name};
 use tactus_core::wire::{Event, ExpectedOutcome, PART, SlideReport, Status, Verdict};
 
 /// Longest table, bytes: more than any chip has flash for.
 const MAX_TABLE: u32 = 1 << 20;
+/// Most samples of a slide: the firmware gives a movement 135 s.
+const MAX_SAMPLES: u32 = 135 * RATE_HZ;
 /// Rounding of probabilities and of what is computed from them.
 const ROUNDING: f32 = 1e-3;
 
@@ -51,7 +54,10 @@ pub(crate) fn impossible(event: &Event) -> Option<&'static str> {
         Event::TrainingSlide {
             trial, observed, ..
         } => all(*trial > 0, COUNT).or_else(|| all(is_measured(observed), NUMBER)),
-        Event::Block(block) => all(block.steady.is_none_or(|(from, to)| from <= to), COUNT),
+        Event::Block(block) => {
+            let can_be = |(from, to)| from <= to && to <= MAX_SAMPLES;
+            all(block.steady.is_none_or(can_be), COUNT)
+        }
         Event::TablePart {
             offset,
             length,
@@ -67,7 +73,7 @@ pub(crate) fn impossible(event: &Event) -> Option<&'static str> {
         Event::Turned {
             g_counts,
             offset_counts,
-        } => all(g_counts.is_finite() && offset_counts.is_finite(), NUMBER),
+        } => all(g_counts.is_normal() && offset_counts.is_finite(), NUMBER),
         _ => None,
     }
 }
@@ -79,10 +85,20 @@ const NUMBER: &str = "a number out of its range";
 const PROBABILITY: &str = "a probability outside 0 to 1";
 
 fn of_status(status: &Status) -> Option<&'static str> {
-    let (month, day) = (status.calibrated / 100 % 100, status.calibrated % 100);
-    let is_day = (2000..2200).contains(&(status.calibrated / 10_000))
-        && (1..=12).contains(&month)
-        && (1..=31).contains(&day);
+    let (year, month, day) = (
+        status.calibrated / 10_000,
+        status.calibrated / 100 % 100,
+        status.calibrated % 100,
+    );
+    // no century that is none of 400 years is among these, but 2100
+    let february = 28 + u32::from(year.is_multiple_of(4) && year != 2100);
+    let longest = match month {
+        2 => february,
+        4 | 6 | 9 | 11 => 30,
+        1..=12 => 31,
+        _ => 0,
+    };
+    let is_day = (2000..2200).contains(&year) && (1..=longest).contains(&day);
     let fits = usize::from(status.textures) <= MAX_TEXTURES && status.table_bytes <= MAX_TABLE;
     if !fits {
         Some(COUNT)
@@ -105,6 +121,23 @@ fn of_verdict(verdict: &Verdict) -> Option<&'static str> {
         let good = verdict.log_odds.is_none_or(f32::is_finite);
         (!good).then_some(NUMBER)
     }
+}
+
+/// Finds what cannot be in a report of an exploration by a table, of so many slides; `None`: all can.
+pub fn foreign(event: &Event, table: Table<'_>, slides: u8) -> Option<&'static str> {
+    let movements = table.movements().len();
+    let fits = match event {
+        Event::Chosen { action, .. } => usize::from(action.movement) < movements,
+        Event::SlideReport {
+            slide, posterior, ..
+        } => *slide <= slides && posterior.len() <= usize::from(table.textures()),
+        Event::Verdict(verdict) => {
+            verdict.slides <= slides && table.name(verdict.texture) == Some(verdict.name.as_str())
+        }
+        Event::Verified { slides: made, .. } => *made <= slides,
+        _ => true,
+    };
+    (!fits).then_some("something that is not in its table, or that it was not asked for")
 }
 
 fn is_share(share: f32) -> bool {

@@ -497,7 +497,17 @@ fn reports_that_no_probe_makes_are_damaged_ones() {
         length,
         bytes: vec![0; bytes].into_iter().collect(),
     };
+    let steady = |steady| {
+        Event::Block(Block {
+            number: 0,
+            still: false,
+            steady: Some(steady),
+            pac: [1; 64].into_iter().collect(),
+            ..Block::default()
+        })
+    };
     let good = [
+        steady((264, 13_200)),
         verdict(|_| ()),
         verdict(|v| (v.probability, v.log_odds) = (1.0, None)),
         verdict(|v| v.name = name("Ölpapier 2 µm")),
@@ -546,6 +556,14 @@ fn reports_that_no_probe_makes_are_damaged_ones() {
             g_counts: f32::NAN,
             offset_counts: 0.0,
         },
+        // a count would be an infinite acceleration
+        Event::Turned {
+            g_counts: 0.0,
+            offset_counts: 0.0,
+        },
+        steady((8000, 7000)),
+        // two months of silence before it
+        steady((4_000_000_000, 4_000_000_001)),
     ];
     for (event, is_good) in good
         .map(|e| (e, true))

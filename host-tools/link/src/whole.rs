@@ -112,6 +112,49 @@ pub fn sync_folder(path: &Path) {
     let _ = File::open(folder.unwrap_or(Path::new("."))).and_then(|folder| folder.sync_all());
 }
 
+/// Files and folders that a command has made, removed in the end unless it [keeps](Self::keep) them: an output of many
+/// files is whole or absent, too.
+#[derive(Debug, Default)]
+pub struct Made {
+    files: Vec<PathBuf>,
+    folders: Vec<PathBuf>,
+}
+
+impl Made {
+    /// Makes a folder, and those above it that are missing.
+    pub fn folder(&mut self, path: &Path) -> io::Result<()> {
+        let missing = path.ancestors().filter(|path| *path != Path::new(""));
+        let missing = missing.take_while(|path| fs::symlink_metadata(path).is_err());
+        self.folders.extend(missing.map(Path::to_owned));
+        fs::create_dir_all(path)
+    }
+
+    /// Notes a file that is made next, unless it is there already: that one is somebody's.
+    pub fn file(&mut self, path: PathBuf) {
+        if fs::symlink_metadata(&path).is_err() {
+            self.files.push(path);
+        }
+    }
+
+    /// Leaves everything where it is.
+    pub fn keep(&mut self) {
+        self.files.clear();
+        self.folders.clear();
+    }
+}
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        // what was not made after all, or has something of others in it, stays as it is
+        for file in &self.files {
+            let _ = fs::remove_file(file);
+        }
+        for folder in &self.folders {
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
 /// A file that has one owner at a time, and is removed with it.
 #[derive(Debug)]
 pub struct Lock {
@@ -207,6 +250,31 @@ mod tests {
         assert_eq!(fs::read(&later).unwrap(), b"mine");
         assert_eq!(names(folder.path()), ["later", "table"]);
         assert!(write_whole(folder.path(), "x").is_err());
+    }
+
+    #[test]
+    fn what_a_failing_command_made_goes_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for keeps in [false, true] {
+            let mut made = Made::default();
+            made.folder(&path("a/b/c")).unwrap();
+            fs::write(path("mine"), "mine").unwrap();
+            for name in ["mine", "a/b/c/one", "never"] {
+                made.file(path(name));
+            }
+            fs::write(path("a/b/c/one"), "one").unwrap();
+            fs::write(path("a/two"), "of another").unwrap();
+            if keeps {
+                made.keep();
+            }
+            drop(made);
+            assert_eq!(
+                [path("a/b"), path("a/b/c/one")].map(|path| path.exists()),
+                [keeps; 2]
+            );
+            assert_eq!(names(folder.path()), ["a", "mine"]);
+        }
     }
 
     /// A command that was killed leaves a part, which the next one takes, however long it is.

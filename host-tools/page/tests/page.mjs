@@ -7,6 +7,7 @@ import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { Worker } from "node:worker_threads";
 import { launch, tab, within } from "./browser.mjs";
+import { ports } from "./port.mjs";
 import { serial } from "./serial.mjs";
 
 const [page, wasm, replies, chromium, probe] = process.argv.slice(2);
@@ -38,6 +39,8 @@ function module() {
     },
   };
 }
+
+ports(test);
 
 test("WebAssembly gives the native replies, byte by byte", async () => {
   const lines = readFileSync(replies, "utf8").trimEnd().split("\n");

@@ -1,12 +1,12 @@
 "use strict";
 // A probe at a serial port: bytes between the browser's port and the module, and what is asked for.
 const Usb = (() => {
-  const BAUD = 921600, EVERY_MS = 20, CLOSING_MS = 1000;
+  const BAUD = 921600, EVERY_MS = 20, CLOSING_MS = 1000, MOST_BYTES = 1 << 20;
   // of ST, who makes the NUCLEO's ST-LINK
   const BOARDS = [{ usbVendorId: 0x0483 }];
   const at = id => document.getElementById(id);
   // of a port that is open: its streams' reader and writer, what came and is not read yet, and the writing under way
-  let page, line = null, frame = null, closing = Promise.resolve(), lossTold = -Infinity;
+  let page, line = null, choosing = false, frame = null, closing = Promise.resolve(), lossTold = -Infinity;
 
   let buttons = [];
   const pause = ms => new Promise(done => { const timer = setInterval(() => { clearInterval(timer); done(); }, ms); });
@@ -40,7 +40,13 @@ const Usb = (() => {
     };
     buttons = Object.keys(works);
     for (const [id, wanted] of Object.entries(works)) at(id).addEventListener("click", () => work(wanted()));
-    at("u-connect").addEventListener("click", () => line ? leave(true) : connect());
+    at("u-connect").addEventListener("click", async () => {
+      if (line) return leave(true);
+      // a second click while a port is chosen
+      if (choosing) return;
+      choosing = true;
+      try { await connect(); } finally { choosing = false; }
+    });
     at("u-stop").addEventListener("click", () => step({ do: "stop" }));
     at("u-log").addEventListener("click", () => step({ do: "log" }));
     at("u-yes").addEventListener("click", () => step({ do: "answer", yes: true }));
@@ -48,7 +54,11 @@ const Usb = (() => {
     at("u-push").addEventListener("change", async () => {
       const file = at("u-push").files[0];
       at("u-push").value = "";
-      if (file) work({ do: "push", file: file.name, bytes: [...new Uint8Array(await file.arrayBuffer())] });
+      if (!file) return;
+      if (file.size > MOST_BYTES) return problem(`${file.name} has ${file.size} bytes: it is no table of a probe. Choose one that tactus learn wrote.`);
+      let bytes;
+      try { bytes = new Uint8Array(await file.arrayBuffer()); } catch (why) { return problem(`${file.name} cannot be read: ${why.message}. Choose it again.`); }
+      work({ do: "push", file: file.name, bytes: [...bytes] });
     });
     show();
   }
@@ -78,7 +88,9 @@ const Usb = (() => {
     }
     const here = line = { port, reader: null, writer: null, came: [], writing: Promise.resolve(), timer: null };
     at("u-said").textContent = "";
-    const { usbVendorId: vendor, usbProductId: product } = port.getInfo?.() ?? {};
+    let info;
+    try { info = port.getInfo(); } catch { /* it is called a serial port then */ }
+    const { usbVendorId: vendor, usbProductId: product } = info ?? {};
     const hex = number => number.toString(16).padStart(4, "0");
     const name = vendor === undefined ? "the serial port" : `USB ${hex(vendor)}:${hex(product ?? 0)}`;
     read(here);

@@ -6,6 +6,7 @@ use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use serde::{Deserialize, Serialize};
+use tactus_core::table::is_printable;
 use tactus_lab::data::import::foreign::{InMemory, Survey};
 use tactus_lab::data::import::settings::Settings;
 use tactus_lab::data::recordings::RecordingSet;
@@ -54,7 +55,21 @@ pub(crate) fn words(
         none if none.is_none() => Ok(String::new()),
         some => Ok(some.str()?.to_string()),
     };
-    let words: Vec<String> = given.try_iter()?.map(word).collect::<PyResult<_>>()?;
+    let all = given.try_iter().map_err(|_| {
+        let kind = given.get_type();
+        PyTypeError::new_err(format!(
+            "{name}: {kind} is given, and wanted is one for each array"
+        ))
+    })?;
+    let words: Vec<String> = all.map(word).collect::<PyResult<_>>()?;
+    let hides = |word: &String| !word.chars().all(is_printable);
+    if let Some(at) = words.iter().position(hides) {
+        let say = format!(
+            "{name}: {:?} of array {at} has characters that do not print; give plain text",
+            words[at]
+        );
+        return Err(PyValueError::new_err(say));
+    }
     if words.len() != arrays {
         let say = format!("{name}: {} of them for {arrays} slides", words.len());
         return Err(PyValueError::new_err(say));

@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use tactus_core::features::{BAND_EDGES, FUSED_BANDS, Property, SlideError};
 use tactus_lab::data::import::copy;
-use tactus_lab::data::import::settings::{SETTINGS, Settings};
+use tactus_lab::data::import::settings::Settings;
 use tactus_lab::data::recording::{PAC_RATE_HZ, Recording};
 use tactus_lab::data::recordings::{Held, RecordingSet};
 use tactus_lab::data::replay::{MeasuredSlide, measure, measure_all, trials};
@@ -201,13 +201,9 @@ impl Recordings {
     fn write(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         let (set, found) = (Arc::clone(&self.set), self.found.clone());
         work(py, move |between| {
-            let written = copy(&set, &folder, &mut |_, _| between());
-            written.map_err(|why| why.raise())?;
-            match found {
-                Some(found) => std::fs::write(folder.join(SETTINGS), found.settings.template()),
-                None => Ok(()),
-            }
-            .map_err(PyErr::from)
+            let settings = found.as_ref().map(|found| &found.settings);
+            let written = copy(&set, &folder, settings, &mut |_, _| between());
+            written.map(drop).map_err(|why| why.raise())
         })
     }
 

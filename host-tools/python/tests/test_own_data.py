@@ -181,6 +181,10 @@ def test_what_are_no_recordings_is_refused():
         (dict(all_=[], labels=[]), tactus.RecordingError, "no recordings"),
         (dict(labels=labels[:-1]), ValueError, "5 of them for 6"),
         (dict(labels="cork"), TypeError, "one for each"),
+        (dict(labels=None), TypeError, "NoneType.* is given, and wanted is one for each"),
+        (dict(labels=["\x1b[2J", *labels[1:]]), ValueError, "array 0 has characters that do not print"),
+        (dict(labels=[*labels[:-1], "cork\u202e"]), ValueError, "array 5 has characters that do not print"),
+        (dict(sessions=["mon\n", *labels[1:]]), ValueError, "sessions: .* do not print"),
         (dict(labels=[*labels[:-1], None]), ValueError, "array 5 has none"),
         (dict(sessions=["mon"]), ValueError, "sessions"),
         (dict(rate_hz=0.5), tactus.RecordingError, "0.5 Hz"),
@@ -195,9 +199,11 @@ def test_what_are_no_recordings_is_refused():
 
 def test_a_copy_and_a_short_one_are_left_out_and_told():
     arrays, labels = sensor(2200, each=3)
-    with pytest.warns(UserWarning, match="left out"):
-        told = tactus.Recordings.from_arrays([*arrays, arrays[0]], rate_hz=2200, labels=[*labels, labels[0]])
-    assert len(told) == 9 and len(told.found["left_out"]) == 1
+    shifted = np.concatenate([arrays[0][500:], arrays[3][:500]])
+    for copy, label in [(arrays[0], labels[0]), (shifted, labels[0]), (shifted, labels[-1]), (-shifted, labels[0])]:
+        with pytest.warns(UserWarning, match=f"left out: array 9: .*slide 1 of {labels[0]} .array 0."):
+            told = tactus.Recordings.from_arrays([*arrays, copy], rate_hz=2200, labels=[*labels, label])
+        assert len(told) == 9 and len(told.found["left_out"]) == 1
     with pytest.warns(UserWarning, match="array 9: too short"):
         told = tactus.Recordings.from_arrays([*arrays, arrays[0][:800]], rate_hz=2200, labels=[*labels, labels[0]])
     assert len(told) == 9 and "array 9" in told.found["left_out"][0]

@@ -4,13 +4,13 @@
 
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, ensure};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use tactus_core::features::Property;
-use tactus_lab::data::whole::{Lock, write_whole};
+use tactus_lab::data::whole::{Lock, Made, write_whole};
 use tactus_lab::eval::evaluate::Method;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
@@ -53,13 +53,23 @@ pub struct Study {
 /// The lock in a folder whose study is not whole.
 const LOCK: &str = "INCOMPLETE.lock";
 
-/// Makes the folder of a report, or takes an empty one, or one that a study was killed in; it is this study's until the
-/// lock is dropped. Called before the work, which takes minutes.
-pub fn prepare(folder: &Path) -> Result<Lock> {
+/// The folder of one study, which goes if that fails.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    // it goes before what is made, which may be the folder
+    _lock: Lock,
+    made: Made,
+}
+
+/// Makes the folder of a report, or takes an empty one, or one that a study was killed in; it is this study's until it
+/// is dropped. Called before the work, which takes minutes.
+pub fn prepare(folder: &Path) -> Result<Folder> {
     let shown = folder.display();
     let unwritable =
         || format!("{shown} cannot be written; give --out a folder that can be written");
-    fs::create_dir_all(folder).with_context(unwritable)?;
+    let mut made = Made::default();
+    made.folder(folder).with_context(unwritable)?;
     let lock = folder.join(LOCK);
     let is_taken = fs::read_dir(folder)
         .with_context(unwritable)?
@@ -69,16 +79,22 @@ pub fn prepare(folder: &Path) -> Result<Lock> {
         !is_taken || lock.is_file(),
         "{shown}: is not empty; give --out a new folder, so that no study is mixed with another"
     );
-    Lock::take(&lock).map_err(|why| match why.kind() {
+    let lock = Lock::take(&lock).map_err(|why| match why.kind() {
         io::ErrorKind::ResourceBusy => {
             anyhow!("{shown}: another study is written there now; give --out a new folder")
         }
         _ => anyhow!(why).context(unwritable()),
+    })?;
+    let path = folder.to_owned();
+    Ok(Folder {
+        path,
+        _lock: lock,
+        made,
     })
 }
 
 /// Writes everything of a study into its folder, the page last; or nothing, where that fails.
-pub fn write(study: &Study, folder: &Path) -> Result<()> {
+pub fn write(study: &Study, folder: &mut Folder) -> Result<()> {
     let (json, page) = (
         json(study)?,
         render(include_str!("report/page.html"), &contents(study)?)?,
@@ -89,20 +105,15 @@ pub fn write(study: &Study, folder: &Path) -> Result<()> {
         ("study.json", json.as_bytes()),
         ("report.html", page.as_bytes()),
     ];
-    let files: Vec<(&str, &[u8])> = tables.chain(rest).collect();
-    for (name, bytes) in &files {
-        let path = folder.join(name);
-        if let Err(why) = write_whole(&path, bytes) {
-            for (name, _) in &files {
-                // those that were written
-                let _ = fs::remove_file(folder.join(name));
-            }
+    for (name, bytes) in tables.chain(rest) {
+        let path = folder.path.join(name);
+        folder.made.file(path.clone());
+        write_whole(&path, bytes).with_context(|| {
             let path = path.display();
-            let unwritable =
-                format!("{path} cannot be written; give --out a folder that can be written");
-            return Err(anyhow!(why).context(unwritable));
-        }
+            format!("{path} cannot be written; give --out a folder that can be written")
+        })?;
     }
+    folder.made.keep();
     Ok(())
 }
 

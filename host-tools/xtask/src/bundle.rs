@@ -173,16 +173,27 @@ fn write(out: &Path, files: &Files) -> Result<()> {
             name.display()
         );
     }
-    for (name, bytes) in files {
-        let file = out.join(name);
+    // all of it, or none: a release is not mixed with an earlier one
+    let part = |name: &String| out.join(format!("{name}.part"));
+    let written = files.iter().try_for_each(|(name, bytes)| {
+        let file = part(name);
         std::fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))?;
         #[cfg(unix)]
         if bytes.starts_with(b"\x7fELF") && !name.ends_with(".elf") {
             use std::os::unix::fs::PermissionsExt as _;
             std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755))?;
         }
+        Ok(())
+    });
+    let named = |name: &String| std::fs::rename(part(name), out.join(name));
+    let written = written.and_then(|()| Ok(files.keys().try_for_each(named)?));
+    if written.is_err() {
+        for name in files.keys() {
+            let _ = std::fs::remove_file(part(name));
+        }
+        let _ = std::fs::remove_dir(out);
     }
-    Ok(())
+    written
 }
 
 fn flashing() -> String {

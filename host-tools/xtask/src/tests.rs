@@ -93,6 +93,24 @@ fn the_security_page_names_every_file_with_unsafe_code() {
 }
 
 #[test]
+fn every_test_of_the_proof_is_there() {
+    let page = text("SECURITY.md");
+    let (_, proof) = page.split_once("\n## Proof\n").unwrap();
+    let (proof, _) = proof.split_once("\n## ").unwrap();
+    let (_, rows) = proof.split_once("|---|---|---|---|\n").unwrap();
+    for name in rows
+        .lines()
+        .flat_map(|row| row.split('`').skip(1).step_by(2))
+    {
+        let mut git = std::process::Command::new("git");
+        git.args(["grep", "-qF", "-e", name, "--", "*.rs", "*.py", "*.mjs"]);
+        let found = git.current_dir(shell::root()).status().unwrap();
+        assert!(found.success(), "{name}");
+    }
+    assert!(rows.lines().count() > 20);
+}
+
+#[test]
 fn the_version_is_the_same_everywhere() {
     let version = env!("CARGO_PKG_VERSION");
     let has = |file: &str, line: &str| assert!(text(file).contains(line), "{file}: {line}");

@@ -90,8 +90,13 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Sliding since the skin was replaced; none if nothing is stored.
+    /// Errors: what is stored is no work, whatever its checksum says.
     pub async fn skin(&mut self) -> Result<SkinCare, StoreError> {
         let (energy_j, wear_j) = self.value(KEY_SKIN).await?.unwrap_or_default();
+        let is_work = |joules: f32| (0.0..f32::INFINITY).contains(&joules);
+        if !(is_work(energy_j) && is_work(wear_j)) {
+            return Err(SettingsError::Record(Setting::Skin).into());
+        }
         Ok(SkinCare::after(energy_j, wear_j))
     }
 

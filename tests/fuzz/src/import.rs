@@ -160,7 +160,7 @@ fn others(wave: &[i16], bytes: &[u8]) -> Vec<(&'static str, u8, Vec<u8>)> {
 /// Files of each kind that are right, long enough for a slide and of 8 KB at most; `import` has settings before them.
 pub(crate) fn seeds(with_settings: bool) -> Vec<Vec<u8>> {
     let wave: Vec<i16> = (0..2400)
-        .map(|n: i32| ((n * n * 37 % 211 - 105) * if n < 2000 { 9 } else { 1 }) as i16)
+        .map(|n: i32| ((n * n * 37 % 1999 / 9 - 111) * if n < 2000 { 9 } else { 1 }) as i16)
         .collect();
     let bytes: Vec<u8> = wave.iter().flat_map(|x| x.to_le_bytes()).collect();
     let rows = |mark: &str| -> String {

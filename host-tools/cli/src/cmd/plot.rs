@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tactus_lab::data::whole::write_whole;
+use tactus_lab::data::whole::{Made, write_whole};
 use tactus_study::chart::Figure;
 
 use super::progress::notice;
@@ -23,12 +23,12 @@ impl Plot {
         let Some(path) = self.plot.clone() else {
             return Ok(None);
         };
-        let part = path.join(".tactus-plot.part");
-        fs::create_dir_all(&path)
+        let (mut made, part) = (Made::default(), path.join(".tactus-plot.part"));
+        made.folder(&path)
             .and_then(|()| fs::write(&part, b""))
             .and_then(|()| fs::remove_file(&part))
             .with_context(|| cannot(&path))?;
-        Ok(Some(Canvas(path)))
+        Ok(Some(Canvas(path, made)))
     }
 }
 
@@ -36,16 +36,20 @@ fn cannot(path: &Path) -> String {
     format!("--plot {}: cannot be written", path.display())
 }
 
-/// A folder for pictures, which can be written.
-pub(crate) struct Canvas(PathBuf);
+/// A folder for pictures, which can be written, and what is made in it.
+pub(crate) struct Canvas(PathBuf, Made);
 
 impl Canvas {
     /// Writes them, whole or not at all, and says so on stderr after what was printed.
-    pub(crate) fn write(self, figures: &[Figure], out: &mut impl Write) -> anyhow::Result<()> {
+    pub(crate) fn write(mut self, figures: &[Figure], out: &mut impl Write) -> anyhow::Result<()> {
         out.flush()?;
         for figure in figures {
             let path = self.0.join(format!("{}.svg", figure.id));
+            self.1.file(path.clone());
             write_whole(&path, &figure.svg).with_context(|| cannot(&path))?;
+        }
+        if !figures.is_empty() {
+            self.1.keep();
         }
         let ids: Vec<&str> = figures.iter().map(|figure| figure.id.as_str()).collect();
         let name = self.0.display();

@@ -87,10 +87,9 @@ fn stage<T>(
 
 /// Makes a study, or a part of one, and writes its report.
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    // until it is written
-    let _lock = report::prepare(&args.out)?;
+    let mut folder = report::prepare(&args.out)?;
     let study = study(args)?;
-    report::write(&study, &args.out)?;
+    report::write(&study, &mut folder)?;
     match args.format {
         Format::Json => out.write_all(report::json(&study)?.as_bytes())?,
         Format::Text => print(args, &study, out)?,

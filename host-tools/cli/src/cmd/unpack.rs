@@ -1,12 +1,12 @@
 //! `tactus unpack`: what the command brings along, as files.
 
-use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
 use tactus_core::table::factory;
 use tactus_lab::data::recordings::RecordingSet;
+use tactus_lab::data::whole::Made;
 use tactus_lab::eval::show::count;
 
 use super::simulate;
@@ -38,10 +38,12 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    fs::create_dir_all(&args.folder)
+    let mut made = Made::default();
+    made.folder(&args.folder)
         .with_context(|| format!("cannot make {}", args.folder.display()))?;
     for (name, table) in factory::ALL {
         let file = args.folder.join(name);
+        made.file(file.clone());
         let kept = write_file(&file, table, Force::default());
         kept.context("a table of the factory; give another folder, or move it away")?;
         writeln!(out, "{}", file.display())?;
@@ -55,6 +57,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             .sum(),
         _ => simulate::record(&collection, &folder)?,
     };
+    made.keep();
     writeln!(
         out,
         "{}: {}, {}",

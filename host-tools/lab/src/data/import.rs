@@ -17,7 +17,8 @@
 //! **The signs of P_AC are not in the files; they are rebuilt** ([`signs`]): magnitudes are exact, power is exact,
 //! spectra are good, zero crossings and the sign of the whole are not known. The sign of P_DC is not rebuilt.
 //!
-//! A slide whose rows are not 10 ms apart, or whose samples no working sensor gives, is left out and named.
+//! A slide whose rows are not 10 ms apart, whose samples no working sensor gives, or that is a copy of another, is left
+//! out and named.
 //!
 //! The files name neither material nor force nor a still record: textures are called `matX`, and movement, window and
 //! background are those of `data/biotac`.
@@ -29,12 +30,14 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use tactus_core::features::Movement;
 
-use crate::data::quality::SlideChecks;
+use crate::data::quality::{Copies, Fingerprint, check};
 use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::files::confined;
 use crate::data::recordings::{RecordingError, RecordingSet, RecordingWriter, Result, is_there};
 use crate::data::rows::Rows;
+
+use settings::{SETTINGS, Settings};
 
 mod cut;
 pub mod foreign;
@@ -57,7 +60,7 @@ pub struct Imported {
     pub textures: usize,
     /// Number of slides.
     pub slides: usize,
-    /// The slides that were left out, and why: samples are missing, or are those of a dead sensor.
+    /// The slides that were left out, and why: samples are missing, or are those of a dead sensor or of another slide.
     pub left_out: Vec<String>,
     /// The slides whose P_AC is cut off a little, and how much.
     pub clipped: Vec<String>,
@@ -66,21 +69,26 @@ pub struct Imported {
 /// The slides of one texture on their way into a folder.
 struct Copying<'w> {
     writer: &'w mut RecordingWriter,
+    copies: &'w mut Copies,
     texture: usize,
     name: String,
-    checks: SlideChecks,
     written: usize,
     left_out: Vec<String>,
     clipped: Vec<String>,
 }
 
 impl<'w> Copying<'w> {
-    fn new(writer: &'w mut RecordingWriter, texture: usize, name: &str) -> Self {
+    fn new(
+        writer: &'w mut RecordingWriter,
+        copies: &'w mut Copies,
+        texture: usize,
+        name: &str,
+    ) -> Self {
         Self {
             writer,
+            copies,
             texture,
             name: name.to_owned(),
-            checks: SlideChecks::default(),
             written: 0,
             left_out: Vec::new(),
             clipped: Vec::new(),
@@ -89,11 +97,14 @@ impl<'w> Copying<'w> {
 
     /// Writes the next slide, unless it is there; one with a fault is left out.
     fn take(&mut self, number: u32, slide: std::result::Result<&Recording, String>) -> Result<()> {
+        let name = format!("slide {number} of {}", self.name);
         let checked = slide.and_then(|slide| {
-            let checked = self.checks.check(slide).map_err(|why| why.to_string());
-            checked.map(|clipped| (slide, clipped))
+            let clipped = check(slide).map_err(|why| why.to_string())?;
+            let added = self.copies.add(&Fingerprint::of(slide), name.clone());
+            added.map_err(|why| why.to_string())?;
+            Ok((slide, clipped))
         });
-        let named = |why: &dyn Display| format!("slide {number} of {}: {why}", self.name);
+        let named = |why: &dyn Display| format!("{name}: {why}");
         match checked {
             Ok((slide, clipped)) => {
                 self.clipped.extend(clipped.map(|why| named(&why)));
@@ -143,16 +154,18 @@ pub fn is_known(from: &Path) -> bool {
 /// written.
 pub fn import(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<Imported> {
     if !from.is_dir() || is_there(from) {
-        return copy(&RecordingSet::open(from)?, to, progress);
+        return copy(&RecordingSet::open(from)?, to, None, progress);
     }
     import_csv(from, to, progress)
 }
 
-/// Writes recordings in the project's own format into the folder `to`, as [`import`] does.
+/// Writes recordings in the project's own format into the folder `to`, as [`import`] does, and the settings that they
+/// were read with beside them, if there are any.
 /// Errors: as of [`import`].
 pub fn copy(
     set: &RecordingSet,
     to: &Path,
+    settings: Option<&Settings>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Imported> {
     let mut done = Imported {
@@ -161,10 +174,10 @@ pub fn copy(
     };
     let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
     let mut writer = begin("import", set.folder(), to, set.textures().to_vec())?;
-    let mut read = 0;
+    let (mut copies, mut read) = (Copies::default(), 0);
     for (texture, Texture { name, .. }) in set.textures().iter().enumerate() {
         let mut keys = set.slides(texture).iter();
-        let mut copying = Copying::new(&mut writer, texture, name);
+        let mut copying = Copying::new(&mut writer, &mut copies, texture, name);
         set.each_slide(texture, &mut |slide| {
             let labels = keys.next().map(|key| key.labels.clone());
             copying.writer.label(labels.unwrap_or_default());
@@ -174,6 +187,9 @@ pub fn copy(
             Ok(())
         })?;
         copying.end(&mut done)?;
+    }
+    if let Some(settings) = settings {
+        writer.put(SETTINGS, settings.template().as_bytes())?;
     }
     writer.finish()?;
     Ok(done)
@@ -200,14 +216,14 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
         name: format!("mat{id}"),
     });
     let mut writer = begin("import", from, to, textures.collect())?;
-    let mut read = 0;
+    let (mut copies, mut read) = (Copies::default(), 0);
     for (texture, (&material, numbers)) in materials.iter().enumerate() {
         let name = format!("mat{material}");
         let folder = raw.join(&name);
         confined(from, &folder)?;
         // a few slides at a time: rebuilding the signs takes most of a second each
         let numbers: Vec<u32> = numbers.iter().copied().collect();
-        let mut copying = Copying::new(&mut writer, texture, &name);
+        let mut copying = Copying::new(&mut writer, &mut copies, texture, &name);
         for some in numbers.chunks(2 * rayon::current_num_threads()) {
             let slides: Vec<_> = some
                 .par_iter()

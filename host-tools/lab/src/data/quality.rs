@@ -1,16 +1,23 @@
-//! Checks of recorded samples before anything is learned from them: a sensor that is dead is no texture.
+//! Checks of recorded samples before anything is learned from them: a sensor that is dead is no texture, and one piece
+//! of a recording is one slide.
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 
 use tactus_core::features::{Signal, SlideError};
 
 use super::recording::{PAC_RATE_HZ, Recording};
-use super::recordings::files::sha256;
-use super::recordings::npy;
 
 /// The streams of a slide begin and end together, but for a sample and the time that a recorder takes to stop, s.
 const STOPPING_S: f64 = 0.1;
+/// Samples that are compared at once.
+const WINDOW: usize = 32;
+/// Most windows that are compared in each second of a slide.
+const PER_SECOND: f64 = 64.0;
+/// Fewest different windows of a slide whose parts are compared. One that is shorter, or repeats itself as a pure tone
+/// does, is compared as a whole.
+const FEWEST: usize = 16;
+/// Share of a slide's windows, one in so many, that may be those of others.
+const SHARED: usize = 3;
 
 /// The reasons why the samples of a slide cannot be those of a sensor that works.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
@@ -18,10 +25,6 @@ pub(crate) enum SampleFault {
     /// The signal hangs, or is cut off.
     #[error(transparent)]
     Signal(#[from] SlideError),
-    #[error(
-        "its P_AC is that of slide {0}, sample for sample: a copy, or a recorder that repeats itself"
-    )]
-    Repeats(u32),
     #[error("P_AC lasts {pac:.2} s and {stream} {other:.2} s: samples are missing")]
     Missing {
         pac: f64,
@@ -30,50 +33,139 @@ pub(crate) enum SampleFault {
     },
 }
 
-/// The slides of one texture, one after the other.
-#[derive(Debug, Default)]
-pub(crate) struct SlideChecks {
-    /// SHA-256 of P_AC, and the number of its slide.
-    seen: HashMap<String, u32>,
+/// Checks the samples of a slide; what is told of a signal that is cut off a little.
+/// Errors: the first fault.
+pub(crate) fn check(slide: &Recording) -> Result<Option<SlideError>, SampleFault> {
+    let pac = slide.pac();
+    let steady = pac.get(slide.steady(PAC_RATE_HZ)).unwrap_or_default();
+    let signal = |samples: &[i16]| {
+        let mut signal = Signal::default();
+        signal.push(samples);
+        signal.check()
+    };
+    signal(&slide.still())?;
+    let clipped = signal(steady)?;
+    let seconds = |samples: usize, rate_hz: u32| samples as f64 / f64::from(rate_hz);
+    let lasts = seconds(pac.len(), PAC_RATE_HZ);
+    let shear = slide.shear_mn().map(|mn| (mn.len(), slide.shear_rate_hz));
+    // without samples it was not measured
+    let pdc = Some((slide.pdc.len(), slide.pdc_rate_hz)).filter(|(samples, _)| *samples > 0);
+    for (stream, of) in [("P_DC", pdc), ("shear", shear)] {
+        let Some((samples, rate_hz)) = of else {
+            continue;
+        };
+        let other = seconds(samples, rate_hz);
+        if (lasts - other).abs() > STOPPING_S + seconds(1, rate_hz) {
+            return Err(SampleFault::Missing {
+                pac: lasts,
+                stream,
+                other,
+            });
+        }
+    }
+    Ok(clipped)
 }
 
-impl SlideChecks {
-    /// Checks the next slide; what is told of a signal that is cut off a little.
-    /// Errors: the first fault of its samples.
-    pub(crate) fn check(&mut self, slide: &Recording) -> Result<Option<SlideError>, SampleFault> {
+/// What a piece of a recording is known again by, wherever it was cut out: hashes of some of its windows, which their
+/// samples choose.
+#[derive(Clone, Debug)]
+pub(crate) struct Fingerprint(Vec<u32>);
+
+impl Fingerprint {
+    /// That of P_AC at constant speed.
+    pub(crate) fn of(slide: &Recording) -> Self {
         let pac = slide.pac();
         let steady = pac.get(slide.steady(PAC_RATE_HZ)).unwrap_or_default();
-        let signal = |samples: &[i16]| {
-            let mut signal = Signal::default();
-            signal.push(samples);
-            signal.check()
-        };
-        signal(&slide.still())?;
-        let clipped = signal(steady)?;
-        let seconds = |samples: usize, rate_hz: u32| samples as f64 / f64::from(rate_hz);
-        let lasts = seconds(pac.len(), PAC_RATE_HZ);
-        let shear = slide.shear_mn().map(|mn| (mn.len(), slide.shear_rate_hz));
-        // without samples it was not measured
-        let pdc = Some((slide.pdc.len(), slide.pdc_rate_hz)).filter(|(samples, _)| *samples > 0);
-        for (stream, of) in [("P_DC", pdc), ("shear", shear)] {
-            let Some((samples, rate_hz)) = of else {
-                continue;
-            };
-            let other = seconds(samples, rate_hz);
-            if (lasts - other).abs() > STOPPING_S + seconds(1, rate_hz) {
-                return Err(SampleFault::Missing {
-                    pac: lasts,
-                    stream,
-                    other,
-                });
+        let samples = steady.iter().map(|x| x.unsigned_abs().into());
+        Self::of_samples(samples, f64::from(PAC_RATE_HZ))
+    }
+
+    /// That of a signal of any sensor, whose sign does not count.
+    pub(crate) fn of_signal(samples: &[f64], rate_hz: f64) -> Self {
+        Self::of_samples(samples.iter().map(|x| x.abs().to_bits()), rate_hz)
+    }
+
+    fn of_samples(samples: impl Iterator<Item = u64>, rate_hz: f64) -> Self {
+        const BASE: u64 = 0x9e37_79b9_7f4a_7c15;
+        // `as` saturates
+        let every = ((rate_hz / PER_SECOND) as u32).max(1);
+        let samples: Vec<u64> = samples.map(mixed).collect();
+        let last = (0..WINDOW).fold(1_u64, |power, _| power.wrapping_mul(BASE));
+        let (mut rolling, mut whole, mut hashes) = (0_u64, 0_u64, Vec::new());
+        for (at, sample) in samples.iter().enumerate() {
+            rolling = rolling.wrapping_mul(BASE).wrapping_add(*sample);
+            whole = mixed(whole ^ sample);
+            if let Some(before) = at.checked_sub(WINDOW) {
+                rolling = rolling.wrapping_sub(samples[before].wrapping_mul(last));
+            }
+            let hash = mixed(rolling);
+            if at + 1 >= WINDOW && (hash as u32).is_multiple_of(every) {
+                hashes.push((hash >> 32) as u32);
             }
         }
-        match self.seen.entry(sha256(&npy::write(&pac))) {
-            Entry::Occupied(other) => Err(SampleFault::Repeats(*other.get())),
-            Entry::Vacant(new) => {
-                new.insert(slide.number);
-                Ok(clipped)
-            }
+        hashes.sort_unstable();
+        let all = hashes.len();
+        hashes.dedup();
+        if hashes.len() < FEWEST || hashes.len() * 4 < all * 3 {
+            hashes = vec![(whole >> 32) as u32];
         }
+        Self(hashes)
+    }
+}
+
+/// A number whose bits depend on all bits of another (the last step of SplitMix64).
+fn mixed(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// A slide whose samples are those of another, shifted or not.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error(
+    "{percent} % of its P_AC is that of {other}, sample for sample: a copy, one recording cut twice, or a recorder \
+     that repeats itself"
+)]
+pub(crate) struct Copied {
+    percent: usize,
+    other: String,
+}
+
+/// Finds copies among the slides of a set, of all textures.
+#[derive(Debug, Default)]
+pub(crate) struct Copies {
+    /// the first slide with a hash
+    seen: HashMap<u32, usize>,
+    slides: Vec<String>,
+}
+
+impl Copies {
+    /// Takes in the next slide; `name` is what it is called where others are its copies.
+    /// Errors: it is one itself.
+    pub(crate) fn add(
+        &mut self,
+        Fingerprint(hashes): &Fingerprint,
+        name: String,
+    ) -> Result<(), Copied> {
+        let mut of: HashMap<usize, usize> = HashMap::new();
+        for slide in hashes.iter().filter_map(|hash| self.seen.get(hash)) {
+            *of.entry(*slide).or_default() += 1;
+        }
+        let shared: usize = of.values().sum();
+        if shared * SHARED > hashes.len() {
+            let most = of
+                .iter()
+                .max_by_key(|(slide, count)| (**count, usize::MAX - **slide));
+            let other = most.and_then(|(slide, _)| self.slides.get(*slide));
+            return Err(Copied {
+                percent: shared * 100 / hashes.len(),
+                other: other.cloned().unwrap_or_default(),
+            });
+        }
+        for hash in hashes {
+            self.seen.entry(*hash).or_insert(self.slides.len());
+        }
+        self.slides.push(name);
+        Ok(())
     }
 }

@@ -133,7 +133,7 @@ impl Recorder {
         let samples = |rate_hz: usize| (pac * rate_hz).div_ceil(PAC_RATE_HZ as usize);
         let (pdc, rate_hz) = if slide.pdc.is_empty() {
             let pdc = (0..=samples(LIVE_HZ as usize)).map(|n| {
-                let at_ms = slide.began_ms? + n as u32 * 1000 / LIVE_HZ;
+                let at_ms = slide.began_ms?.wrapping_add(n as u32 * 1000 / LIVE_HZ);
                 let forces = slide.forces.iter();
                 let (_, force_mn) = forces.min_by_key(|(told, _)| told.abs_diff(at_ms))?;
                 Some((f32::from(*force_mn) / self.calibration.force_mn_per_count).round() as i16)

@@ -1,6 +1,7 @@
 //! Recorded slides, measured by the core: a [`Rig`] replays them one by one, or a whole folder is measured at once.
 
 use std::collections::HashMap;
+use std::fmt::Display;
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +12,7 @@ use tactus_core::features::{
 use tactus_core::rig::Rig;
 use tactus_core::table::SlideHash;
 
-use crate::data::quality::SlideChecks;
+use crate::data::quality::{Copies, Fingerprint, check};
 use crate::data::recording::{Labels, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingSet};
@@ -100,7 +101,8 @@ pub fn trials(slides: &[MeasuredSlide]) -> Vec<usize> {
 
 /// Measures every slide of a folder, several textures at once; `done` gets each texture when it is finished. Returns
 /// the slides of each texture in the order of time.
-/// Errors: the first file that cannot be read, or the first slide that has no properties or is that of a dead sensor.
+/// Errors: the first file that cannot be read, or the first slide that has no properties, is that of a dead sensor, or
+/// is a copy of another.
 pub fn measure_all(
     set: &RecordingSet,
     done: impl Fn(&Texture) + Sync,
@@ -149,29 +151,43 @@ fn measure_each<T: Send>(
     let plan = Plan::new();
     let textures: Vec<usize> = (0..set.textures().len()).collect();
     let memory = |index: &usize| set.memory(*index);
-    each_in_flight(&textures, memory, |&index| {
+    let measured = each_in_flight(&textures, memory, |&index| {
         let texture = &set.textures()[index];
-        let (mut checks, mut measured) = (SlideChecks::default(), Vec::new());
+        let (mut prints, mut measured) = (Vec::new(), Vec::new());
         // in the order of time, as slides are read
         let mut keys = set.slides(index).iter();
         set.each_slide(index, &mut |slide| {
-            let fault = |why: String| {
-                let (number, texture) = (slide.number, &texture.name);
-                RecordingError::said(format!("slide {number} of {texture}: {why}"))
-            };
-            checks.check(&slide).map_err(|why| {
-                fault(format!(
-                    "{why} (record it again, or let `tactus import` leave it out)"
-                ))
-            })?;
+            check(&slide).map_err(|why| unusable(texture, slide.number, &why))?;
+            prints.push((slide.number, Fingerprint::of(&slide)));
             let labels = keys.next().map(|key| key.labels.clone());
             let labels = labels.unwrap_or_default();
-            measured.push(of(&plan, &slide, &labels).map_err(|why| fault(why.to_string()))?);
+            measured.push(of(&plan, &slide, &labels).map_err(|why| {
+                RecordingError::said(format!("{}: {why}", slide_name(texture, slide.number)))
+            })?);
             Ok(())
         })?;
         done(texture);
-        Ok(measured)
-    })
+        Ok((prints, measured))
+    })?;
+    let mut copies = Copies::default();
+    for (texture, (prints, _)) in set.textures().iter().zip(&measured) {
+        for (number, print) in prints {
+            let added = copies.add(print, slide_name(texture, *number));
+            added.map_err(|why| unusable(texture, *number, &why))?;
+        }
+    }
+    Ok(measured.into_iter().map(|(_, measured)| measured).collect())
+}
+
+pub(crate) fn slide_name(texture: &Texture, number: u32) -> String {
+    format!("slide {number} of {}", texture.name)
+}
+
+fn unusable(texture: &Texture, number: u32, why: &dyn Display) -> RecordingError {
+    let slide = slide_name(texture, number);
+    RecordingError::said(format!(
+        "{slide}: {why} (record it again, or let `tactus import` leave it out)"
+    ))
 }
 
 /// A rig whose unknown texture is a pile of recorded slides: each movement replays one of that movement, drawn without

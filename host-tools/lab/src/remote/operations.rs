@@ -21,7 +21,7 @@ pub use tactus_link::operations::Learned;
 use tactus_link::operations::{self, Sample, Training, ask_to_lay, ask_to_move};
 use tactus_link::person::QuestionKind;
 use tactus_link::say::{Prompts, count, show_verifying};
-use tactus_link::{Identified, OperationError, Probe, Request};
+use tactus_link::{Identified, LinkError, OperationError, Probe, Request, foreign};
 
 type Result<T> = std::result::Result<T, OperationError>;
 
@@ -43,12 +43,22 @@ pub async fn identify(
     let (mut words, seed) = (probe.words(), wanted.seed);
     writeln!(words, "An unknown texture, one of {among} (seed {seed}).")?;
     let mut show = Show::new(table, words);
+    let slides = wanted.max_slides;
     let identified = operations::identify(probe, wanted, |report| {
+        can_be(report, table, slides)?;
         each(report);
         show.event(&report.event)
     });
     let identified = identified.await?;
     Ok((identified, show.answered()))
+}
+
+/// Errors: the report is of another exploration, or damaged.
+fn can_be(report: &Report, table: Table<'_>, slides: u8) -> io::Result<()> {
+    match foreign(&report.event, table, slides) {
+        None => Ok(()),
+        Some(what) => Err(io::Error::other(LinkError::Impossible(what))),
+    }
 }
 
 /// Names the texture of the last exploration, and compares it with the others.
@@ -79,13 +89,18 @@ pub async fn verify(probe: &Probe, texture: u16, wanted: Identify) -> Result<Ver
         strategy: Strategy::Cycling,
         ..wanted
     };
+    let slides = wanted.max_slides;
     let mut verifying = Verifying::new(&bytes, texture, config_of(&wanted))?;
     let (mut prompts, mut words) = (Prompts::default(), probe.words());
     writeln!(words, "Is it {}?", verifying.reference())?;
     let request = Request::command(Command::Verify(wanted));
-    let each = |report: &Report| match verifying.hear(&report.event) {
-        Some(slide) => print_slide(slide, &mut words),
-        None => show_verifying(report, &mut prompts, &mut words),
+    let table = Table::read(&bytes)?;
+    let each = |report: &Report| {
+        can_be(report, table, slides)?;
+        match verifying.hear(&report.event) {
+            Some(slide) => print_slide(slide, &mut words),
+            None => show_verifying(report, &mut prompts, &mut words),
+        }
     };
     probe.run(request, each).await?;
     let verified = verifying.end();

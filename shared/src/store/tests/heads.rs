@@ -3,6 +3,7 @@
 
 use super::ram::Torn;
 use super::*;
+use crate::store::records::{KEY_CALIBRATION, KEY_FALSE_ALARM, KEY_HIGH_FORCE, KEY_SKIN};
 
 /// Where the page begins that a fresh store writes to.
 const PAGE: usize = 2 * SECTOR;
@@ -305,5 +306,59 @@ fn a_record_of_another_kind_hides_no_other() {
         assert_eq!(block_on(store.skin()), Ok(skin(1.0)));
         let felt = block_on(store.training_record("felt", Movement::FOR_FINENESS, None));
         assert_eq!(felt, Ok((key != 16).then(|| stats(3))), "{key}");
+    }
+}
+
+/// A checksum that is right makes no value right: nothing that cannot be is believed, and a new value is taken.
+#[test]
+fn a_value_that_cannot_be_is_not_believed_and_can_be_replaced() {
+    let work = |energy: f32, wear: f32| [energy.to_le_bytes(), wear.to_le_bytes()].concat();
+    let share = |share: f32| [&[1][..], &share.to_le_bytes()].concat();
+    let mut scale = calibration(3).to_bytes().to_vec();
+    let bits = scale.len();
+    scale[bits / 2..].fill(0xFF);
+    let cases = [
+        (KEY_SKIN, work(f32::NAN, 1.0)),
+        (KEY_SKIN, work(1.0, f32::INFINITY)),
+        (KEY_SKIN, work(-1.0, 0.0)),
+        (KEY_SKIN, vec![1, 2, 3]),
+        (KEY_FALSE_ALARM, share(f32::NAN)),
+        (KEY_FALSE_ALARM, share(-0.1)),
+        (KEY_FALSE_ALARM, share(2.0)),
+        (KEY_FALSE_ALARM, vec![9]),
+        (KEY_HIGH_FORCE, vec![7]),
+        (KEY_HIGH_FORCE, vec![]),
+        (KEY_CALIBRATION, vec![]),
+        (KEY_CALIBRATION, vec![0xFF; bits]),
+        (KEY_CALIBRATION, scale),
+    ];
+    for (key, bytes) in cases {
+        let why = std::format!("{key}: {bytes:?}");
+        let mut store = open(worn());
+        block_on(store.store_checked(key, &bytes)).unwrap();
+        let mut store = open(store.close().again());
+        assert_eq!(store.settings(), Ok(()), "{why}");
+        let found = block_on(store.skin());
+        assert_eq!(found.ok(), (key != KEY_SKIN).then(|| skin(1.0)), "{why}");
+        let found = block_on(store.calibration());
+        let is_ours = found.is_ok_and(|found| found == Some(calibration(3)));
+        assert_eq!(is_ours, key != KEY_CALIBRATION, "{why}");
+        assert_eq!(block_on(store.false_alarm()).ok().flatten(), None, "{why}");
+        assert_ne!(block_on(store.high_force()), Ok(true), "{why}");
+        block_on(async {
+            store.set_skin(&skin(2.0)).await.unwrap();
+            store.set_calibration(&calibration(4)).await.unwrap();
+            store.set_false_alarm(Some(0.05)).await.unwrap();
+            store.set_high_force(true).await.unwrap();
+        });
+        let mut store = open(store.close().again());
+        assert_eq!(block_on(store.skin()), Ok(skin(2.0)), "{why}");
+        assert_eq!(
+            block_on(store.calibration()),
+            Ok(Some(calibration(4))),
+            "{why}"
+        );
+        assert_eq!(block_on(store.false_alarm()), Ok(Some(0.05)), "{why}");
+        assert_eq!(block_on(store.high_force()), Ok(true), "{why}");
     }
 }

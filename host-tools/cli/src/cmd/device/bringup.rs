@@ -18,6 +18,7 @@ use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
 use crate::cmd::output::Format;
 use crate::cmd::printed::{prompt as ask_for, say};
+use tactus_lab::data::whole::Made;
 
 /// Bring up a new rig: check its parts and wires step by step, and name what is wrong
 #[derive(clap::Args)]
@@ -50,8 +51,10 @@ const TRIES: u32 = 3;
 const HELLO: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let begun = std::fs::create_dir_all(&how.report);
-    let begun = begun.and_then(|()| Journal::open(&how.report.join("journal.jsonl")));
+    let (mut made, path) = (Made::default(), how.report.join("journal.jsonl"));
+    let begun = made.folder(&how.report);
+    made.file(path.clone());
+    let begun = begun.and_then(|()| Journal::open(&path));
     let mut journal = begun.with_context(|| format!("--report {}", how.report.display()))?;
     let interrupt = Interrupt::catch()?;
     let place = Where {
@@ -81,6 +84,7 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             .and_then(|reset| reset.ok_or(Trouble::Silent))
             .and_then(|_| bringup::run(Ends::SelfTest(&mut board), &mut person, &mut journal))
     };
+    made.keep();
     let report = Report::new(&journal);
     report.write(&how.report)?;
     write!(out, "{}", report.text())?;

@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use anyhow::{anyhow, ensure};
+use tactus_core::table::valid_name;
 use tactus_lab::data::recording::{Labels, Texture};
 use tactus_lab::data::recordings::RecordingWriter;
 use tactus_lab::eval::show::count;
@@ -64,11 +66,20 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         name: name.trim().to_owned(),
     });
     // before anything moves
+    for (at, name) in textures.iter().enumerate() {
+        valid_name(name.trim()).map_err(|why| anyhow!("the name {name:?} {why}"))?;
+        let before = textures[..at].iter().map(|name| name.trim());
+        ensure!(
+            !before.into_iter().any(|other| other == name.trim()),
+            "{name}: is named twice; record it once, with more --slides"
+        );
+    }
     let command = format!(
         "tactus device record {} --slides {slides}",
         textures.join(" ")
     );
-    let mut writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let writer = RecordingWriter::begin(&args.out, named.collect(), &command)?;
+    let mut writer = writer.by_hand();
     let (mut bench, status) = Bench::open(&args.at, Format::Text)?;
     writer.label(Labels {
         lot: args.lot.trim().to_owned(),

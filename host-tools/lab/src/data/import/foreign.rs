@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,7 +13,7 @@ use super::cut::Parts;
 use super::resample::RATES_HZ;
 use super::settings::{Named, SETTINGS, Settings};
 use super::signals::Signals;
-use crate::data::quality::SlideChecks;
+use crate::data::quality::{Copies, Fingerprint, check};
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
@@ -301,15 +300,9 @@ impl Survey {
             progress(written, self.slides());
             Ok(())
         })?;
-        self.write_settings(to)?;
+        writer.put(SETTINGS, self.settings().template().as_bytes())?;
         writer.finish()?;
         Ok(left_out)
-    }
-
-    /// Writes the settings that say all that was found beside the recordings in a folder.
-    pub fn write_settings(&self, folder: &Path) -> Result<()> {
-        let path = folder.join(SETTINGS);
-        fs::write(&path, self.settings().template()).map_err(|why| RecordingError::at(&path, why))
     }
 
     fn texture_list(&self) -> Vec<Texture> {
@@ -321,6 +314,7 @@ impl Survey {
     }
 
     /// Gives away each slide with its labels. Returns the slides that were left out, and why.
+    /// Errors: A file cannot be read again, or no slide is left of a texture.
     fn each_slide(
         &self,
         take: &mut dyn FnMut(Recording, Labels) -> Result<()>,
@@ -328,8 +322,7 @@ impl Survey {
         let places = self.textures.iter().zip(0..);
         let places: HashMap<&String, usize> = places.collect();
         let mut numbers = vec![0_u32; self.textures.len()];
-        let mut checks: Vec<SlideChecks> = numbers.iter().map(|_| SlideChecks::default()).collect();
-        let mut left_out = Vec::new();
+        let (mut copies, mut left_out) = (Copies::default(), Vec::new());
         // the parts of a file lie next to each other
         for parts in self.found.chunk_by(|a, b| a.path == b.path) {
             let (signals, place) = self.source.signals(&parts[0].path, &self.settings)?;
@@ -358,7 +351,20 @@ impl Survey {
                         number: numbers[texture] + 1,
                         ..slide.map_err(at)?
                     };
-                    if let Err(why) = checks[texture].check(&slide) {
+                    let name = format!(
+                        "slide {} of {} ({})",
+                        slide.number, found.texture, found.path
+                    );
+                    // a shift in these samples is none of whole samples after resampling
+                    let raw = how.rows(found, range, pac.len());
+                    let raw = signals
+                        .channel(&self.channel)
+                        .and_then(|(_, all)| all.get(raw));
+                    let print = Fingerprint::of_signal(raw.unwrap_or_default(), how.rate_hz);
+                    let checked = check(&slide).map_err(|why| why.to_string());
+                    let checked = checked
+                        .and_then(|_| copies.add(&print, name).map_err(|why| why.to_string()));
+                    if let Err(why) = checked {
                         left_out.push(format!("{}: {why}", found.path));
                         continue;
                     }
@@ -367,11 +373,16 @@ impl Survey {
                 }
             }
         }
+        if let Some(texture) = numbers.iter().position(|slides| *slides == 0) {
+            let (of, why) = (&self.textures[texture], left_out.first());
+            return Err(RecordingError::said(format!(
+                "no slide of {of} can be used, record others: {}",
+                why.map_or("", String::as_str)
+            )));
+        }
         Ok(left_out)
     }
-}
 
-impl Survey {
     fn labels(&self, found: &Found) -> Labels {
         Labels {
             session: found.session.clone(),

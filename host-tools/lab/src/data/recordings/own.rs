@@ -29,7 +29,8 @@
 //!
 //! All streams of a slide cover the same time. A slide is refused, and `tactus import` leaves it out, where P_AC does
 //! not change for 100 ms, stands at an end of the converter's range, has more than a quarter of its samples there,
-//! repeats another slide of the texture, or lasts longer or shorter than another stream. More than 1 % cut off is told.
+//! has more than a third of the samples of other slides in it, shifted or not, or lasts longer or shorter than another
+//! stream. More than 1 % cut off is told.
 use std::collections::HashMap;
 use std::collections::hash_map::Entry as Place;
 use std::path::Path;

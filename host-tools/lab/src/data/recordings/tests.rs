@@ -265,7 +265,8 @@ fn a_changed_byte_is_a_wrong_hash() {
 fn the_writer_refuses_what_the_reader_would() {
     let folder = TempDir::new().unwrap();
     let textures = vec![texture(1, "felt"), texture(2, "silk")];
-    let mut writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
+    let writer = RecordingWriter::begin(folder.path(), textures.clone(), "test").unwrap();
+    let mut writer = writer.by_hand();
     writer.write(&slide(0, 1)).unwrap();
     let message = |e: RecordingError| e.to_string();
     let twice = message(writer.write(&slide(0, 1)).unwrap_err());
@@ -316,7 +317,10 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn a_writer_goes_on_wherever_the_last_one_was_cut_off() {
     let textures = vec![texture(7, "cotton, \"washed\""), texture(3, "felt")];
     let slides = [slide(0, 1), slide(0, 4), slide(1, 2)];
-    let begin = |folder: &Path| RecordingWriter::begin(folder, textures.clone(), "test").unwrap();
+    let begin = |folder: &Path| {
+        let begun = RecordingWriter::begin(folder, textures.clone(), "test");
+        begun.unwrap().by_hand()
+    };
     let whole = TempDir::new().unwrap();
     let mut writer = begin(whole.path());
     for slide in &slides {

@@ -2,7 +2,8 @@
 //!
 //! Files of samples come first, then the slide's row, in `manifest.csv.part`, which becomes the manifest when all is
 //! there. Beside it lies [`INCOMPLETE`], which names the recording in progress: the same command continues after any
-//! interruption, and no other one writes into the folder. A lock keeps a second command out meanwhile.
+//! interruption, and no other one writes into the folder. A lock keeps a second command out meanwhile. A command that
+//! fails removes what it made, unless that was made [by hand](RecordingWriter::by_hand).
 
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions};
@@ -20,7 +21,7 @@ use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
-use crate::data::whole::{Lock, sync_folder};
+use crate::data::whole::{Lock, Made, sync_folder};
 
 const ROWS: &str = "manifest.csv.part";
 const LOCK: &str = "INCOMPLETE.lock";
@@ -37,10 +38,10 @@ pub struct RecordingWriter {
     rows: Vec<Vec<String>>,
     keys: HashSet<(usize, u32)>,
     journal: File,
-    /// the folder was not there before
-    made: bool,
-    /// no other command writes into the folder
-    lock: Option<Lock>,
+    by_hand: bool,
+    /// no other command writes into the folder; it goes before what is made, which may be the folder
+    _lock: Lock,
+    made: Made,
 }
 
 impl RecordingWriter {
@@ -49,22 +50,13 @@ impl RecordingWriter {
     /// Errors: if the folder cannot be made, or holds recordings, or unfinished ones of another command, or other
     /// files, or another command writes into it now; or two textures have one number.
     pub fn begin(folder: &Path, textures: Vec<Texture>, command: &str) -> Result<Self> {
-        let made = !folder.exists();
-        let begun = Self::begin_in(folder, made, textures, &note(command));
-        if made && begun.is_err() {
-            // nothing else is in it
-            let _ = fs::remove_file(folder.join(INCOMPLETE));
-            let _ = fs::remove_dir(folder);
-        }
-        begun
-    }
-
-    fn begin_in(folder: &Path, made: bool, textures: Vec<Texture>, note: &str) -> Result<Self> {
+        let note = &note(command);
         distinct_textures(&folder.join(MANIFEST), &textures)?;
         for texture in &textures {
             check_text(&folder.join(MANIFEST), "texture", &texture.name)?;
         }
-        fs::create_dir_all(folder).map_err(|e| io_error(folder, e))?;
+        let mut made = Made::default();
+        made.folder(folder).map_err(|e| io_error(folder, e))?;
         let lock = Lock::take(&folder.join(LOCK)).map_err(|why| match why.kind() {
             ErrorKind::ResourceBusy => {
                 let cause = "another command writes recordings here now: wait for that one, or give another folder";
@@ -73,7 +65,7 @@ impl RecordingWriter {
             _ => io_error(folder, why),
         })?;
         // the last moment of a command that ended after all was whole
-        if folder.join(MANIFEST).exists() && read_note(folder)?.as_deref() == Some(note) {
+        if folder.join(MANIFEST).exists() && read_note(folder)?.as_ref() == Some(note) {
             drop(fs::remove_file(folder.join(INCOMPLETE)));
             return Err(taken(folder, MANIFEST));
         }
@@ -83,7 +75,7 @@ impl RecordingWriter {
             }
         }
         let rows = match read_note(folder)? {
-            Some(there) if there == note => rows_there(folder, &textures)?,
+            Some(there) if there == *note => rows_there(folder, &textures)?,
             // it had not come to its first slide
             Some(_) if read_rows(folder)?.lines().count() < 2 => Vec::new(),
             Some(there) => return Err(RecordingError::unfinished(folder, &there)),
@@ -94,6 +86,8 @@ impl RecordingWriter {
             }
         };
         let keys = rows.iter().filter_map(|row| key(row, &textures)).collect();
+        made.file(folder.join(INCOMPLETE));
+        made.file(folder.join(ROWS));
         replace(folder, INCOMPLETE, note.as_bytes())?;
         Ok(Self {
             journal: journal(folder, &rows)?,
@@ -102,9 +96,17 @@ impl RecordingWriter {
             labels: Labels::default(),
             rows,
             keys,
+            by_hand: false,
+            _lock: lock,
             made,
-            lock: Some(lock),
         })
+    }
+
+    /// Recordings that took somebody's time: whole slides stay where a later one fails, and the same command continues.
+    #[must_use]
+    pub fn by_hand(mut self) -> Self {
+        self.by_hand = true;
+        self
     }
 
     #[must_use]
@@ -177,10 +179,9 @@ impl RecordingWriter {
             ));
         }
 
-        let folder = &self.folder;
+        let (folder, made) = (&self.folder, &mut self.made);
         let row = row(texture, slide, &self.labels, |file, bytes| {
-            let path = folder.join(file);
-            fs::write(&path, bytes).map_err(|e| io_error(&path, e))
+            put(folder, file, bytes, made)
         })?;
         let written = csv(std::iter::once(&row)).and_then(|row| self.journal.write_all(&row));
         written.map_err(|e| io_error(&self.folder.join(ROWS), e))?;
@@ -189,9 +190,15 @@ impl RecordingWriter {
         Ok(())
     }
 
+    /// Writes a file beside the slides.
+    /// Errors: if it cannot be written.
+    pub(crate) fn put(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        put(&self.folder, name, bytes, &mut self.made)
+    }
+
     /// Gives the manifest its name: from here on the folder holds recordings.
     /// Errors: if a texture has no slide, or the manifest cannot be written.
-    pub fn finish(self) -> Result<()> {
+    pub fn finish(mut self) -> Result<()> {
         let manifest = self.folder.join(MANIFEST);
         let there: HashSet<usize> = self.keys.iter().map(|(texture, _)| *texture).collect();
         let mut textures = self.textures.iter().enumerate();
@@ -215,6 +222,7 @@ impl RecordingWriter {
             .sync_all()
             .and_then(|()| fs::rename(self.folder.join(ROWS), &manifest))
             .map_err(|e| io_error(&manifest, e))?;
+        self.made.keep();
         sync_folder(&manifest);
         let note = self.folder.join(INCOMPLETE);
         fs::remove_file(&note).map_err(|e| io_error(&note, e))
@@ -222,26 +230,17 @@ impl RecordingWriter {
 }
 
 impl Drop for RecordingWriter {
-    /// Removes an empty folder; a part of a slide stays, so that the same command can continue.
     fn drop(&mut self) {
-        let is_ours = |entry: std::io::Result<fs::DirEntry>| {
-            entry.is_ok_and(|entry| {
-                [ROWS, INCOMPLETE, PART, LOCK]
-                    .map(Into::into)
-                    .contains(&entry.file_name())
-            })
-        };
-        let is_bare = fs::read_dir(&self.folder).is_ok_and(|mut entries| entries.all(is_ours));
-        if self.rows.is_empty() && is_bare {
-            // they may be gone already
-            let _ = fs::remove_file(self.folder.join(ROWS));
-            let _ = fs::remove_file(self.folder.join(INCOMPLETE));
-            self.lock = None;
-            if self.made {
-                let _ = fs::remove_dir(&self.folder);
-            }
+        if self.by_hand && !self.rows.is_empty() {
+            self.made.keep();
         }
     }
+}
+
+fn put(folder: &Path, name: &str, bytes: &[u8], made: &mut Made) -> Result<()> {
+    let path = folder.join(name);
+    made.file(path.clone());
+    fs::write(&path, bytes).map_err(|e| io_error(&path, e))
 }
 
 /// The row of a slide; its files are `put` where they belong.

@@ -98,13 +98,6 @@ impl Survey {
             slides[slide.texture].push((slide, labels));
             Ok(())
         })?);
-        if let Some(texture) = slides.iter().position(Vec::is_empty) {
-            let (of, why) = (&self.textures[texture], left_out.first());
-            return Err(RecordingError::said(format!(
-                "no slide of {of} can be used, record others: {}",
-                why.map_or("", String::as_str)
-            )));
-        }
         let all = self.texture_list().into_iter().zip(slides).collect();
         Ok((RecordingSet::in_memory(FOLDER.as_ref(), all), left_out))
     }

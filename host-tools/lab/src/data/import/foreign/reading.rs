@@ -193,6 +193,12 @@ impl How {
         out.into_iter().map(|x| (x * gain).round() as i16).collect()
     }
 
+    /// The rows that a part of P_AC, which has so many samples in all, was made of.
+    pub(super) fn rows(&self, found: &Found, part: &Range<usize>, samples: usize) -> Range<usize> {
+        let at = |sample: usize| found.rows.start + sample * found.rows.len() / samples.max(1);
+        at(part.start)..at(part.end)
+    }
+
     /// A slow column at [`SLOW_HZ`] of the resampled clock: the mean of what falls between two of its samples.
     pub(super) fn slow(
         &self,
