@@ -10,6 +10,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use tactus_core::sensor::FingerCode;
 use tactus_core::table::valid_name;
 
@@ -205,19 +206,16 @@ impl RecordingWriter {
         if let Some((_, empty)) = textures.find(|(texture, _)| !there.contains(texture)) {
             return Err(RecordingError::empty_texture(&manifest, empty));
         }
-        for name in self
+        let names = self
             .rows
-            .iter()
-            .flat_map(|row| FILES.map(|(file, _)| &row[file]))
-        {
-            // of a stream that was not measured there is none
-            if name.is_empty() {
-                continue;
-            }
+            .par_iter()
+            .flat_map_iter(|row| FILES.map(|(file, _)| &row[file]));
+        // of a stream that was not measured there is none
+        names.filter(|name| !name.is_empty()).try_for_each(|name| {
             let path = self.folder.join(name);
             let kept = File::open(&path).and_then(|file| file.sync_all());
-            kept.map_err(|e| io_error(&path, e))?;
-        }
+            kept.map_err(|e| io_error(&path, e))
+        })?;
         self.journal
             .sync_all()
             .and_then(|()| fs::rename(self.folder.join(ROWS), &manifest))
