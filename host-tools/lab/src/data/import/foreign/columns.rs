@@ -230,7 +230,7 @@ pub(super) fn lively(signals: &Signals, settings: &Settings) -> Result<Vec<Strin
 /// There is no such channel.
 pub(super) fn no_channel(signals: &Signals, wanted: &str) -> String {
     format!(
-        "no column of numbers {wanted:?}; there are {}",
+        "no channel or column of numbers {wanted:?}; there are {}",
         names(signals)
     )
 }
