@@ -97,7 +97,7 @@ pub(crate) fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
 /// Imports, and has the evaluation say how many of the names are right.
 pub(crate) fn verdict(at: &Scratch, options: &str) -> RecordingSet {
     let import = at.printed(&format!("import data recordings {options}"));
-    assert_says(&import, &["cork", "suede", "recordings: written"]);
+    assert_says(&import, &["cork", "suede", "recordings: written, "]);
     let said = at.printed("evaluate --recordings recordings --train-slides 4 --runs 200");
     let line = said
         .lines()
@@ -402,6 +402,9 @@ fn a_copy_that_is_shifted_is_left_out_and_named() {
         for line in left_out {
             assert_says(line, &["% of its P_AC is that of slide ", first, second]);
         }
+        let rows = at.printed("features --recordings recordings --format csv");
+        let slides = rows.lines().count() - 1;
+        assert_says(&said, &[&format!("recordings: written, {slides} slides")]);
     }
 }
 

@@ -311,8 +311,11 @@ fn what_cannot_be_read_says_what_to_do() {
         );
     });
     for (options, parts) in [
-        ("--channel b", &["no column of numbers \"b\"", "ms, a"][..]),
-        ("--time when", &["no column of numbers \"when\""]),
+        (
+            "--channel b",
+            &["no channel or column of numbers \"b\"", "ms, a"][..],
+        ),
+        ("--time when", &["no channel or column of numbers \"when\""]),
         (
             "--texture '{material}/*.csv'",
             &["{material} is no field", "{texture}, {session}"],
@@ -321,7 +324,7 @@ fn what_cannot_be_read_says_what_to_do() {
         (
             "--texture cloth",
             &[
-                "no column of numbers \"cloth\"",
+                "no channel or column of numbers \"cloth\"",
                 "columns of words are none",
             ],
         ),

@@ -137,8 +137,8 @@ impl Recordings {
     /// samples at least, at 2200 Hz or of the slower clock.
     ///
     /// unit: of the samples, such as "g", "m/s2" or "V"; those in "counts" stay as they are. gain: counts per unit;
-    /// what fills 12 bits without clipping is found, unless given, and told by `gain`: give it again for slides that are
-    /// to be compared with these. channel, pressure, shear: numbers of the channels, from 0, of the vibration (the
+    /// what fills 12 bits without clipping is found, unless given, and told by `gain`: give it again for slides that
+    /// are to be compared with these. channel, pressure, shear: numbers of the channels, from 0, of the vibration (the
     /// liveliest, unless given), of the contact's pressure (P_DC) and of the tangential force in N (neither, unless
     /// given). sessions, runs: one for each array, where they are known; without runs each array is one. finger: name
     /// of the sensor. force_n, speed_mm_s: the movement, if it is known.

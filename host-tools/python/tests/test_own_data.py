@@ -176,7 +176,7 @@ def test_what_are_no_recordings_is_refused():
         (dict(all_=[np.ma.masked_greater(array, 0) for array in arrays]), ValueError, "masked"),
         (dict(all_=np.zeros((6, 2, 2, 2))), ValueError, "shape"),
         (dict(all_=[array[:900] for array in arrays]), tactus.RecordingError, "array 0: too short"),
-        (dict(all_=still), tactus.RecordingError, "never changes"),
+        (dict(all_=still), tactus.RecordingError, "array 0: no channel in it ever changes"),
         (dict(all_=[]), ValueError, "labels"),
         (dict(all_=[], labels=[]), tactus.RecordingError, "no recordings"),
         (dict(labels=labels[:-1]), ValueError, "5 of them for 6"),

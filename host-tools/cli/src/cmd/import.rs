@@ -119,10 +119,12 @@ fn signals(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let bar = progress(survey.slides() as u64, "writing slides");
     let left_out = survey.write(to, &|done, _| bar.set_position(done as u64))?;
     bar.finish_and_clear();
-    for slide in left_out {
+    for slide in &left_out {
         writeln!(out, "left out: {slide}")?;
     }
-    writeln!(out, "{}: written", to.display())?;
+    let cut: usize = survey.found.iter().map(|found| found.slides.len()).sum();
+    let slides = count(cut.saturating_sub(left_out.len()) as u64, "slide");
+    writeln!(out, "{}: written, {slides}", to.display())?;
     Ok(())
 }
 

@@ -1,5 +1,5 @@
-//! Signals of any file: WAV, tables of text, numpy's arrays, MCAP of ours, each told by its content; gzip around them is
-//! undone.
+//! Signals of any file: WAV, tables of text, numpy's arrays, MCAP of ours, each told by its content; gzip around them
+//! is undone.
 
 use std::borrow::Cow;
 use std::collections::HashMap;

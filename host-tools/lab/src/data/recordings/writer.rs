@@ -193,6 +193,7 @@ impl RecordingWriter {
 
     /// Writes a file beside the slides.
     /// Errors: if it cannot be written.
+    #[cfg(feature = "files")]
     pub(crate) fn put(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         put(&self.folder, name, bytes, &mut self.made)
     }

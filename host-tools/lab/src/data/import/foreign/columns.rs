@@ -222,7 +222,7 @@ pub(super) fn lively(signals: &Signals, settings: &Settings) -> Result<Vec<Strin
     let best = found
         .first()
         .map(|(rank, ..)| *rank)
-        .ok_or("no column of numbers beside the time that changes: is the sensor connected?")?;
+        .ok_or("no channel in it ever changes: is the sensor connected?")?;
     let best = found.into_iter().take_while(|(rank, ..)| *rank == best);
     Ok(best.map(|(_, _, name)| name.to_owned()).collect())
 }
@@ -230,7 +230,7 @@ pub(super) fn lively(signals: &Signals, settings: &Settings) -> Result<Vec<Strin
 /// There is no such channel.
 pub(super) fn no_channel(signals: &Signals, wanted: &str) -> String {
     format!(
-        "no column of numbers {wanted:?}; there are {}",
+        "no channel or column of numbers {wanted:?}; there are {}",
         names(signals)
     )
 }

@@ -103,8 +103,8 @@ pub(super) fn npy(file: &[u8], most: usize) -> Result<Signals, String> {
     let walk = Walk::once(&array).ok_or_else(|| {
         let dimensions = array.shape.len();
         format!(
-            "an array of {dimensions} dimensions; save one or two, or a .npz of X with a row for each slide, and y with \
-             its texture"
+            "an array of {dimensions} dimensions; save one or two, or a .npz of X with a row for each slide, and y \
+             with its texture"
         )
     })?;
     Ok(Signals {

@@ -1,5 +1,5 @@
-//! Tables of text: the encoding, the mark between columns, decimal commas, lines before the table, a row of units, and a
-//! header that comes again are found by looking at them.
+//! Tables of text: the encoding, the mark between columns, decimal commas, lines before the table, a row of units, and
+//! a header that comes again are found by looking at them.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -289,8 +289,8 @@ fn trimmed(mut fields: Vec<Cow<'_, str>>) -> Vec<Cow<'_, str>> {
     fields
 }
 
-/// The names of the columns by the rows before the first one of numbers, and the rows that are these: the last ones that
-/// are as wide; a second one has the units.
+/// The names of the columns by the rows before the first one of numbers, and the rows that are these: the last ones
+/// that are as wide; a second one has the units.
 fn names<'t>(style: Style, before: &[&'t str], first: &str) -> (Vec<String>, Vec<&'t str>) {
     let width = trimmed(style.fields(first)).len();
     let mut rows = before
