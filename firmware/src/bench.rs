@@ -77,7 +77,7 @@ impl Counter for Cycles {
 
 const WANTED: u32 = 0x7ac7_be7c;
 
-/// Whether the host wants the bench: it writes so before the chip starts, and the start-up code leaves it alone. After
+/// True if the host wants the bench: it writes so before the chip starts, and the start-up code leaves it alone. After
 /// power-up any other word is as likely as this one.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.BENCH_WANTED")]

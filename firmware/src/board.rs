@@ -210,7 +210,7 @@ pub(crate) fn flaw() -> Option<&'static str> {
 const NO_CLOCK: &str =
     "no 8 MHz from the ST-LINK (see its solder bridges): runs by the chip's own clock, 1 % off";
 
-/// Whether the debug probe's 8 MHz are there. embassy would wait for them without end.
+/// True if the debug probe's 8 MHz are there. embassy would wait for them without end.
 fn find_clock() -> bool {
     RCC.cr().modify(|w| w.set_hsebyp(true));
     RCC.cr().modify(|w| w.set_hseon(true));

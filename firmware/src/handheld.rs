@@ -3,7 +3,7 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us, if wanted | words to `hand` |
-//! | UART7's interrupt | `hand` | states, button, buzzer, requests; owns the store | pictures to `show`, reports to `send` |
+//! | UART7's interrupt | `hand` | states, button, buzzer, requests, the store | pictures to `show`, reports to `send` |
 //! | UART7's interrupt | `receive`, `send` | frames of USART3 | requests to `hand` |
 //! | UART7's interrupt | `show` | the display, by I2C1 and its DMA | |
 //! | UART7's interrupt | `acquire` | starts the slots when the sensor is ready | |

@@ -3,7 +3,7 @@
 //! | executor | task | does | tells |
 //! |---|---|---|---|
 //! | interrupts of TIM2 and SPI1 | `chip::slots` | a sensor word every 227 us | words to `servo` |
-//! | UART5's interrupt, by the clock's | `servo` | control, guard and watchdog, 1 kHz | samples to `probe`, a snapshot |
+//! | UART5's interrupt, by the clock's | `servo` | control, guard, watchdog, 1 kHz | samples to `probe`, a snapshot |
 //! | thread mode | `probe` | explorations, training, tables; owns the store | commands to `servo`, reports to `send` |
 //! | thread mode | `acquire` | starts the slots when the sensor is ready | |
 //! | thread mode | `watch` | phases, faults and places as they change | reports to `send` |

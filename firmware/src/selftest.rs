@@ -204,7 +204,7 @@ impl Bench {
         }
     }
 
-    /// Whether a motor may move; should the firmware give up meanwhile, the rescue can drive both then.
+    /// True if a motor may move; should the firmware give up meanwhile, the rescue can drive both then.
     fn may_move(&self) -> Result<(), Stopped> {
         let switches = &self.motors.pins;
         if !self.squeezed {

@@ -35,7 +35,7 @@ pub use phase::{Ended, HIGH_FORCE_MN, Phase, Refused, RigError, most_mn};
 /// three movements.
 pub const MAX_REJECTED: u8 = 6;
 
-/// Whether no more of a slide is needed.
+/// True if no more of a slide is needed.
 pub type Enough<'a> = &'a mut dyn FnMut(&mut Slide<'_>) -> bool;
 
 /// A board, a simulator or a recording: it makes one movement and delivers the samples.
@@ -75,7 +75,7 @@ pub trait Rig {
         Ok(())
     }
 
-    /// Whether a movement can be tried again after this failure, once the rig has done by itself what that takes. One
+    /// True if a movement can be tried again after this failure, once the rig has done by itself what that takes. One
     /// that needs a person cannot.
     async fn recover(&mut self, _failed: &Self::Error) -> bool {
         false

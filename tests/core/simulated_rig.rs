@@ -339,7 +339,12 @@ fn command() -> impl Strategy<Value = Command> {
         1 => Just(Command::Reset),
         1 => any::<bool>().prop_map(Command::AllowHighForce),
         1 => (any_float(), any_float(), any_float()).prop_map(
-            |(mn_per_count, no_contact, newton_per_ampere)| Command::Calibrate { mn_per_count, no_contact, newton_per_ampere }),
+            |(mn_per_count, no_contact, newton_per_ampere)| Command::Calibrate {
+                mn_per_count,
+                no_contact,
+                newton_per_ampere
+            }
+        ),
         1 => (1u8..=117).prop_map(Command::Place),
         1 => Just(Command::SampleChanged),
         1 => (0u16..=2000).prop_map(Command::Weigh),

@@ -18,7 +18,7 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM0 => dma::InterruptHandler<peripherals::DMA1_CH0>;
 });
 
-/// Whether [`NEXT`] is to be shown, or the display is to be off.
+/// True if [`NEXT`] is to be shown, or the display is to be off.
 static SHOW: Signal<CriticalSectionRawMutex, bool> = Signal::new();
 /// What is to be shown next. It is copied with interrupts on: a signal would move its 1 KB with them off, and for
 /// longer than a sensor slot may be late.

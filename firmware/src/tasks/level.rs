@@ -9,7 +9,7 @@ use crate::chip::rescue;
 
 pub(crate) struct OneLevel;
 
-/// Whether this runs where an image's tasks for the host do. An image has those of one level only: `rig.rs`,
+/// True if this runs where an image's tasks for the host do. An image has those of one level only: `rig.rs`,
 /// `handheld.rs`.
 fn is_there() -> bool {
     match SCB::vect_active() {

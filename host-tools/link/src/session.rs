@@ -120,7 +120,7 @@ pub struct Session {
     missing: u64,
     /// understands what a host says
     echo: Receiver,
-    /// What was sent, and what came, as the poorest line carries it; each up to [`COMPARED`].
+    /// Bytes that were sent, and that came, as the poorest line carries them; each up to [`COMPARED`].
     carried: [Vec<u8>; 2],
     /// Why nothing that comes in can be believed.
     pub(crate) refused: Option<LinkError>,

@@ -115,12 +115,12 @@ pub fn sync_folder(path: &Path) {
 /// Files and folders that a command has made, removed in the end unless it [keeps](Self::keep) them: an output of many
 /// files is whole or absent, too.
 #[derive(Debug, Default)]
-pub struct Made {
+pub struct NewOutputs {
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
 }
 
-impl Made {
+impl NewOutputs {
     /// Makes a folder, and those above it that are missing.
     pub fn folder(&mut self, path: &Path) -> io::Result<()> {
         let missing = path.ancestors().filter(|path| *path != Path::new(""));
@@ -143,7 +143,7 @@ impl Made {
     }
 }
 
-impl Drop for Made {
+impl Drop for NewOutputs {
     fn drop(&mut self) {
         // what was not made after all, or has something of others in it, stays as it is
         for file in &self.files {
@@ -257,7 +257,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         for keeps in [false, true] {
-            let mut made = Made::default();
+            let mut made = NewOutputs::default();
             made.folder(&path("a/b/c")).unwrap();
             fs::write(path("mine"), "mine").unwrap();
             for name in ["mine", "a/b/c/one", "never"] {

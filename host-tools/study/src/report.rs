@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result, anyhow, ensure};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use tactus_core::features::Property;
-use tactus_lab::data::whole::{Lock, Made, write_whole};
+use tactus_lab::data::whole::{Lock, NewOutputs, write_whole};
 use tactus_lab::eval::evaluate::Method;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
@@ -59,7 +59,7 @@ pub struct Folder {
     path: PathBuf,
     // it goes before what is made, which may be the folder
     _lock: Lock,
-    made: Made,
+    made: NewOutputs,
 }
 
 /// Makes the folder of a report, or takes an empty one, or one that a study was killed in; it is this study's until it
@@ -68,7 +68,7 @@ pub fn prepare(folder: &Path) -> Result<Folder> {
     let shown = folder.display();
     let unwritable =
         || format!("{shown} cannot be written; give --out a folder that can be written");
-    let mut made = Made::default();
+    let mut made = NewOutputs::default();
     made.folder(folder).with_context(unwritable)?;
     let lock = folder.join(LOCK);
     let is_taken = fs::read_dir(folder)

@@ -14,7 +14,7 @@ pub struct Verification {
     pub answer: Answer,
 }
 
-/// Whether it is the same.
+/// True if it is the same.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Answer {
     /// It is.

@@ -33,7 +33,7 @@ impl Method {
         }
     }
 
-    /// Whether it can use such a table.
+    /// True if it can use such a table.
     pub const fn suits(self, contents: Contents) -> bool {
         matches!(
             (self, contents),
@@ -79,12 +79,12 @@ pub struct Config {
     pub threshold: f32,
     /// After this many slides the most probable texture is the answer, sure or not.
     pub max_slides: u8,
-    /// Whether the answer may be that it is none of the candidates.
+    /// True if the answer may be that it is none of the candidates.
     pub open: bool,
     /// Share of the known textures that may be taken for new ones, if the answer may be that: with a table that is
     /// calibrated, whose own share it is unless given.
     pub false_alarm: Option<f32>,
-    /// Whether the question is whether it is the only candidate: slides are made until [`Explorer::verification`]
+    /// True if the question is whether it is the only candidate: slides are made until [`Explorer::verification`]
     /// answers.
     ///
     /// [`Explorer::verification`]: super::Explorer::verification

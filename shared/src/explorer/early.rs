@@ -1,5 +1,5 @@
-//! Whether a slide may end before its end: the posterior after what it has said so far, by a table that knows slides of
-//! that length.
+//! The decision to end a slide before its end: the posterior after what it has said so far, by a table that knows slides
+//! of that length.
 //!
 //! A probability that is read again and again while a slide goes on is above a threshold more often by chance than one
 //! that is read once. So it is read at a few lengths only, and has to be more certain than at the end of a slide.
@@ -17,7 +17,7 @@ pub struct Look {
     pub texture: u16,
     /// Probability of all others together.
     pub doubt: f32,
-    /// Whether it is probable enough, and looks like one of the candidates, and as that was learned.
+    /// True if it is probable enough, and looks like one of the candidates, and as that was learned.
     pub known: bool,
 }
 

@@ -75,7 +75,7 @@ pub struct EpisodeSummary {
     pub table: u32,
     /// The most probable texture.
     pub texture: u16,
-    /// Whether the probe may learn from it by itself.
+    /// True if the probe may learn from it by itself.
     pub certain: bool,
     /// The movements made, with the number of slides and their whitened mean; none with a table of Gaussians.
     pub observed: Vec<(u8, u8, Vector), MAX_MOVEMENTS>,

@@ -48,14 +48,14 @@ pub struct Verdict {
     pub texture: u16,
     /// Its posterior probability.
     pub probability: f32,
-    /// Whether that exceeds the threshold, and the slides fit the texture.
+    /// True if that exceeds the threshold, and the slides fit the texture.
     pub sure: bool,
-    /// Whether it would be sure, but the table's [`OpenSet`](crate::table::OpenSet) says that a new texture would too
+    /// True if it would be sure, but the table's [`OpenSet`](crate::table::OpenSet) says that a new texture would too
     /// often be called so.
     pub most_like: bool,
-    /// Whether it is rather none of them.
+    /// True if it is rather none of them.
     pub unknown: bool,
-    /// Whether it is sure, but not as it was learned: worn, drifted, or something much like it.
+    /// True if it is sure, but not as it was learned: worn, drifted, or something much like it.
     pub changed: bool,
     /// Log-odds that it is none of them, where the method can tell; with a calibrated table, by how much its score
     /// exceeds the limit.
@@ -213,7 +213,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         self.log_odds
     }
 
-    /// Whether the texture is rather none of the candidates, as far as can be told.
+    /// True if the texture is rather none of the candidates, as far as can be told.
     pub fn is_unknown(&self) -> bool {
         let [at_once, later] = UNKNOWN_OVER;
         let limit = match (&self.limits, self.slides < UNKNOWN_SLIDES) {
@@ -225,7 +225,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         self.log_odds.is_some_and(|log_odds| log_odds > limit)
     }
 
-    /// Whether the slides are as like one of the candidates as those of known textures mostly are: a texture is not
+    /// True if the slides are as like one of the candidates as those of known textures mostly are: a texture is not
     /// sure otherwise, however probable. True where the method or the table cannot tell.
     pub fn fits(&self) -> bool {
         let limit = match &self.limits {
@@ -241,7 +241,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         at(Some(share)) - at(self.config.false_alarm)
     }
 
-    /// Whether no name is told as sure: new textures would too often get one, and may come.
+    /// True if no name is told as sure: new textures would too often get one, and may come.
     pub fn is_guarded(&self) -> bool {
         self.config.open && self.table.open_set().is_some_and(|of| !of.may_name())
     }
@@ -316,7 +316,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         Some(elsewhere - top as f32 / 65536.0)
     }
 
-    /// Whether the posterior is certain enough for the probe to learn from it by itself. Never by the paper's
+    /// True if the posterior is certain enough for the probe to learn from it by itself. Never by the paper's
     /// properties alone: one in ten such updates would be wrong.
     pub fn is_certain(&self) -> bool {
         let known = if self.is_calibrated() {

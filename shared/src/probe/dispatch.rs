@@ -38,7 +38,7 @@ pub const fn turn(command: &Command, busy: bool) -> Turn {
     }
 }
 
-/// Whether this may erase a sector of the flash as often as a host asks for it: what takes its time between, as a
+/// True if this may erase a sector of the flash as often as a host asks for it: what takes its time between, as a
 /// training, does not.
 const fn may_erase(command: &Command) -> bool {
     matches!(

@@ -119,7 +119,7 @@ pub trait Panel {
         false
     }
 
-    /// Whether raw samples are wanted from the next movement on.
+    /// True if raw samples are wanted from the next movement on.
     fn stream(&mut self, on: bool);
 
     /// Sends an event to the host.

@@ -45,7 +45,7 @@ pub enum RigCommand {
     StartUnloaded(u32),
     /// Uses this calibration.
     Calibrate(RigCalibration),
-    /// Whether movements may press with up to 2 N.
+    /// True if movements may press with up to 2 N.
     AllowHighForce(bool),
     /// A person is asked to lay a weight of so many mN on the lifted finger; 0, none is expected any more.
     Weigh(u16),
@@ -158,7 +158,7 @@ impl Samples {
 /// What runs [`Control`], and hands on its samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Servo {
-    /// Whether it has a stage of ours, whose motor's current is the shear; otherwise an arm moves the finger.
+    /// True if it has a stage of ours, whose motor's current is the shear; otherwise an arm moves the finger.
     fn has_stage(&self) -> bool {
         true
     }
@@ -169,7 +169,7 @@ pub trait Servo {
     /// Waits for the end of a slide, [`LOOK_MS`] at most.
     async fn wait(&mut self);
 
-    /// Whether the board's button is pressed; `None` on a board without one.
+    /// True if the board's button is pressed; `None` on a board without one.
     fn pressed(&self) -> Option<bool> {
         None
     }
@@ -194,10 +194,10 @@ pub trait Servo {
     /// Ends the slide that is being made, if one is: see [`Control::end_slide`].
     fn end_slide(&mut self);
 
-    /// Whether the whole request is stopped: nothing further is to begin.
+    /// True if the whole request is stopped: nothing further is to begin.
     fn is_stopped(&self) -> bool;
 
-    /// Whether raw samples are wanted.
+    /// True if raw samples are wanted.
     fn streams(&self) -> bool;
 
     /// Sends raw samples to the host.

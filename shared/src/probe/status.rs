@@ -31,7 +31,7 @@ pub struct RigState {
     pub air_counts: Option<f32>,
     /// The constants in use.
     pub calibration: RigCalibration,
-    /// Whether movements may press with up to 2 N.
+    /// True if movements may press with up to 2 N.
     pub high_force: bool,
     /// What the skin has been through.
     pub skin: SkinCare,

@@ -179,7 +179,7 @@ impl Training {
         self.table.filter(|_| self.goes_on)
     }
 
-    /// Whether there is to be a table in the end; a pilot beside another table has only a result.
+    /// True if there is to be a table in the end; a pilot beside another table has only a result.
     pub(crate) fn makes_table(&self) -> bool {
         self.makes_table
     }

@@ -27,7 +27,7 @@ pub(super) const KEY_CALIBRATION: u8 = 1;
 pub(super) const KEY_SKIN: u8 = 2;
 /// The share of false alarms that the probe's limits are for.
 pub(super) const KEY_FALSE_ALARM: u8 = 3;
-/// Whether movements may press with up to 2 N.
+/// True if movements may press with up to 2 N.
 pub(super) const KEY_HIGH_FORCE: u8 = 4;
 /// The first of the unfinished trainings: a texture at one movement each.
 pub(super) const KEY_TRAINED: u8 = 16;
@@ -55,10 +55,10 @@ pub(super) trait Record: Serialize + for<'b> Deserialize<'b> {
     const FIRST: u8;
     const PLACES: u8;
 
-    /// Whether this record takes the place of `old`.
+    /// True if this record takes the place of `old`.
     fn replaces(&self, old: &Self) -> bool;
 
-    /// Whether `old` is given up for this record when space runs out.
+    /// True if `old` is given up for this record when space runs out.
     fn outlives(&self, old: &Self) -> bool;
 }
 

@@ -14,7 +14,7 @@ use super::layout::{Slots, UNITS, WORD};
 pub struct Store<F> {
     pub(super) flash: F,
     pub(super) slots: Slots,
-    /// Whether the settings can be used, and whether their schema has been written.
+    /// True if the settings can be used, and whether their schema has been written.
     pub(super) settings: Result<bool, SettingsError>,
     /// Key of a record that was damaged when the store was opened, and could not be put right.
     pub(super) lost: Option<u8>,

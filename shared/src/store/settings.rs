@@ -36,7 +36,7 @@ enum Use {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Whether the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.
+    /// True if the settings can be used. If not, [`Store::erase_settings`] makes them so; the tables are not concerned.
     /// Errors: why not.
     pub fn settings(&self) -> Result<(), SettingsError> {
         self.settings.map(|_| ())

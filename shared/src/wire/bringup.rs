@@ -103,7 +103,7 @@ pub enum Saw {
     Sensor(SensorSeen),
     /// See [`Look`].
     Look(Look),
-    /// Whether the finger was squeezed.
+    /// True if the finger was squeezed.
     Squeeze(Result<(), Stopped>),
     /// See [`LeverSeen`].
     Lever(LeverSeen),

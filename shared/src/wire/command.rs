@@ -52,7 +52,7 @@ pub enum Command {
     ReadCalibration,
     /// Takes and keeps these constants: [`crate::rig::calibration::RigCalibration::to_bytes`].
     WriteCalibration(Vec<u8, 64>),
-    /// Whether the probe sends raw samples: [`super::Event::Block`].
+    /// True if the probe sends raw samples: [`super::Event::Block`].
     Stream(bool),
     /// Asks for the table in use from this byte on: [`super::Event::TablePart`].
     ReadTable(u32),
@@ -100,9 +100,9 @@ pub struct Identify {
     pub method: Option<Method>,
     /// How the next movement is chosen.
     pub strategy: Strategy,
-    /// Whether the answer may be that it is none of them.
+    /// True if the answer may be that it is none of them.
     pub open: bool,
-    /// Whether the probe learns from a verdict that is certain.
+    /// True if the probe learns from a verdict that is certain.
     pub learn: bool,
     /// For random choices, and for where on the sample slides begin.
     pub seed: u32,

@@ -139,7 +139,7 @@ pub enum Event {
         /// Counts above that of the lifted finger.
         counts: f32,
     },
-    /// Whether it is the texture asked for, after so many slides.
+    /// True if it is the texture asked for, after so many slides.
     Verified {
         /// Slides that counted.
         slides: u8,
@@ -232,7 +232,7 @@ pub struct Status {
     pub table_bytes: u32,
     /// The last four bytes of it: its CRC-32.
     pub table_crc: u32,
-    /// Whether it came with the firmware.
+    /// True if it came with the firmware.
     pub factory: bool,
     /// Day on which the force per count was measured, as 20261121, 1 where nobody knew the day; 0 if it is the paper's.
     pub calibrated: u32,
@@ -242,7 +242,7 @@ pub struct Status {
     pub skin_mj: (u32, u32),
     /// Share of false alarms that limits are for, if it was set: see [`super::Command::SetFalseAlarm`].
     pub false_alarm: Option<f32>,
-    /// Whether movements may press with up to 2 N: see [`super::Command::SetHighForce`].
+    /// True if movements may press with up to 2 N: see [`super::Command::SetHighForce`].
     pub high_force: bool,
     /// The finger that the firmware is for.
     pub finger: FingerCode,
@@ -332,19 +332,19 @@ pub struct Verdict {
     pub name: Name,
     /// Posterior probability.
     pub probability: f32,
-    /// Whether it is over the threshold.
+    /// True if it is over the threshold.
     pub sure: bool,
-    /// Whether it is rather none of the textures known; the one named is the most alike.
+    /// True if it is rather none of the textures known; the one named is the most alike.
     pub unknown: bool,
     /// Log-odds of that, where they can be told.
     pub log_odds: Option<f32>,
     /// Slides that counted.
     pub slides: u8,
-    /// Whether the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
+    /// True if the probe asks for [`super::Command::Label`]: the table is fused, and the probe is not certain.
     pub wants_label: bool,
-    /// Whether it is sure, but the texture is not as it was learned.
+    /// True if it is sure, but the texture is not as it was learned.
     pub changed: bool,
-    /// Whether it would be sure, but the table is sure of a wrong name for too many new textures.
+    /// True if it would be sure, but the table is sure of a wrong name for too many new textures.
     pub most_like: bool,
 }
 
@@ -369,7 +369,7 @@ pub struct TextureLearned {
     pub name: Name,
     /// How many slides.
     pub slides: u8,
-    /// Whether by itself; otherwise from the user.
+    /// True if by itself; otherwise from the user.
     pub itself: bool,
 }
 

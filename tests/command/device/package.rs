@@ -30,7 +30,8 @@ with tactus.Probe(sys.argv[1], log=sys.argv[2]) as probe:
     probe.stop()
     assert probe.status()['phase'] == 'Ready'
     assert probe.losses == (0, 0), probe.losses
-    trained = [r['event']['TrainingSlide']['left'] for r in probe.train('new one', trials=2, seed=4) if 'TrainingSlide' in r['event']]
+    events = [report['event'] for report in probe.train('new one', trials=2, seed=4)]
+    trained = [event['TrainingSlide']['left'] for event in events if 'TrainingSlide' in event]
     assert trained == list(range(len(table.settings) * 2))[::-1], trained
     assert probe.table().textures == [*table.textures, 'new one']
     print(json.dumps(verdict))

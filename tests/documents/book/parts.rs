@@ -225,7 +225,7 @@ fn wire() -> String {
     text
 }
 
-/// Whether it is part of a message.
+/// True if it is part of a message.
 pub(super) fn is_sent(attributes: &[syn::Attribute]) -> bool {
     use quote::ToTokens as _;
     attributes.iter().any(|attribute| {

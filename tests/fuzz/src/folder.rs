@@ -157,7 +157,8 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
         "{columns}\n3,felt,1,0.5,25,0.02,0.1,2.2,,,a.npy,2200,HASH,a.npy,100,HASH,,100,\n\
          3,felt,2,0.5,25,0.02,0.1,,a.npy,HASH,a.npy,2200,HASH,a.npy,100,HASH,a.npy,110,HASH\n"
     );
-    let biotac = r#"{"slides":[1,2],"record":[{"name":"pac","count":220,"rate_hz":2200},{"name":"pdc","count":10,"rate_hz":100},
+    let biotac = r#"{"slides":[1,2],"record":[{"name":"pac","count":220,"rate_hz":2200},
+{"name":"pdc","count":10,"rate_hz":100},
 {"name":"f_tangential","count":10,"rate_hz":100}],"motion":{"speed_mm_s":25.0},"steady_window_s":[0.02,0.1],
 "files":[{"file":"a.gz","material":1,"name":"felt","n_slides":2,"bytes_gz":PACKED_SIZE,"bytes_raw":SIZE,
 "sha256_gz":"PACKED_HASH","sha256_raw":"HASH"}]}"#;
@@ -171,7 +172,8 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
         .flat_map(|movement| [(0, movement), (1, movement)]);
     let recordings = twice.zip(0..).map(|((rep, (setpoint, mm_s)), number)| {
         format!(
-            r#"{{"pressure_setpoint":{setpoint},"speed_mm_s":{mm_s},"direction":-1,"rep":{rep},"n":72,"offset_values":{}}}"#,
+            r#"{{"pressure_setpoint":{setpoint},"speed_mm_s":{mm_s},"direction":-1,
+"rep":{rep},"n":72,"offset_values":{}}}"#,
             number * 72 * 16
         )
     });

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tactus_lab::data::whole::{Made, write_whole};
+use tactus_lab::data::whole::{NewOutputs, write_whole};
 use tactus_study::chart::Figure;
 
 use super::progress::notice;
@@ -23,7 +23,7 @@ impl Plot {
         let Some(path) = self.plot.clone() else {
             return Ok(None);
         };
-        let (mut made, part) = (Made::default(), path.join(".tactus-plot.part"));
+        let (mut made, part) = (NewOutputs::default(), path.join(".tactus-plot.part"));
         made.folder(&path)
             .and_then(|()| fs::write(&part, b""))
             .and_then(|()| fs::remove_file(&part))
@@ -37,7 +37,7 @@ fn cannot(path: &Path) -> String {
 }
 
 /// A folder for pictures, which can be written, and what is made in it.
-pub(crate) struct Canvas(PathBuf, Made);
+pub(crate) struct Canvas(PathBuf, NewOutputs);
 
 impl Canvas {
     /// Writes them, whole or not at all, and says so on stderr after what was printed.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use tactus_core::table::factory;
 use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::whole::Made;
+use tactus_lab::data::whole::NewOutputs;
 use tactus_lab::eval::show::count;
 
 use super::simulate;
@@ -38,7 +38,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let mut made = Made::default();
+    let mut made = NewOutputs::default();
     made.folder(&args.folder)
         .with_context(|| format!("cannot make {}", args.folder.display()))?;
     for (name, table) in factory::ALL {

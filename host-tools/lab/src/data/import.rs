@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use tactus_core::features::Movement;
 
-use crate::data::quality::{Copies, Fingerprint, check};
+use crate::data::quality::{DuplicateSearch, Fingerprint, check};
 use crate::data::recording::{Recording, Texture};
 use crate::data::recordings::biotac::{BACKGROUND_POWER, NOMINAL_FORCE_MN};
 use crate::data::recordings::files::confined;
@@ -69,7 +69,7 @@ pub struct Imported {
 /// The slides of one texture on their way into a folder.
 struct Copying<'w> {
     writer: &'w mut RecordingWriter,
-    copies: &'w mut Copies,
+    copies: &'w mut DuplicateSearch,
     texture: usize,
     name: String,
     written: usize,
@@ -80,7 +80,7 @@ struct Copying<'w> {
 impl<'w> Copying<'w> {
     fn new(
         writer: &'w mut RecordingWriter,
-        copies: &'w mut Copies,
+        copies: &'w mut DuplicateSearch,
         texture: usize,
         name: &str,
     ) -> Self {
@@ -174,7 +174,7 @@ pub fn copy(
     };
     let total = (0..done.textures).map(|t| set.slides(t).len()).sum();
     let mut writer = begin("import", set.folder(), to, set.textures().to_vec())?;
-    let (mut copies, mut read) = (Copies::default(), 0);
+    let (mut copies, mut read) = (DuplicateSearch::default(), 0);
     for (texture, Texture { name, .. }) in set.textures().iter().enumerate() {
         let mut keys = set.slides(texture).iter();
         let mut copying = Copying::new(&mut writer, &mut copies, texture, name);
@@ -216,7 +216,7 @@ fn import_csv(from: &Path, to: &Path, progress: &mut dyn FnMut(usize, usize)) ->
         name: format!("mat{id}"),
     });
     let mut writer = begin("import", from, to, textures.collect())?;
-    let (mut copies, mut read) = (Copies::default(), 0);
+    let (mut copies, mut read) = (DuplicateSearch::default(), 0);
     for (texture, (&material, numbers)) in materials.iter().enumerate() {
         let name = format!("mat{material}");
         let folder = raw.join(&name);

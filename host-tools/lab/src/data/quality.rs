@@ -66,8 +66,8 @@ pub(crate) fn check(slide: &Recording) -> Result<Option<SlideError>, SampleFault
     Ok(clipped)
 }
 
-/// What a piece of a recording is known again by, wherever it was cut out: hashes of some of its windows, which their
-/// samples choose.
+/// Marks by which a piece of a recording is known again, wherever it was cut out: hashes of some of its windows, which
+/// their samples choose.
 #[derive(Clone, Debug)]
 pub(crate) struct Fingerprint(Vec<u32>);
 
@@ -127,27 +127,27 @@ fn mixed(x: u64) -> u64 {
     "{percent} % of its P_AC is that of {other}, sample for sample: a copy, one recording cut twice, or a recorder \
      that repeats itself"
 )]
-pub(crate) struct Copied {
+pub(crate) struct DuplicateSlide {
     percent: usize,
     other: String,
 }
 
 /// Finds copies among the slides of a set, of all textures.
 #[derive(Debug, Default)]
-pub(crate) struct Copies {
+pub(crate) struct DuplicateSearch {
     /// the first slide with a hash
     seen: HashMap<u32, usize>,
     slides: Vec<String>,
 }
 
-impl Copies {
+impl DuplicateSearch {
     /// Takes in the next slide; `name` is what it is called where others are its copies.
     /// Errors: it is one itself.
     pub(crate) fn add(
         &mut self,
         Fingerprint(hashes): &Fingerprint,
         name: String,
-    ) -> Result<(), Copied> {
+    ) -> Result<(), DuplicateSlide> {
         let mut of: HashMap<usize, usize> = HashMap::new();
         for slide in hashes.iter().filter_map(|hash| self.seen.get(hash)) {
             *of.entry(*slide).or_default() += 1;
@@ -158,7 +158,7 @@ impl Copies {
                 .iter()
                 .max_by_key(|(slide, count)| (**count, usize::MAX - **slide));
             let other = most.and_then(|(slide, _)| self.slides.get(*slide));
-            return Err(Copied {
+            return Err(DuplicateSlide {
                 percent: shared * 100 / hashes.len(),
                 other: other.cloned().unwrap_or_default(),
             });

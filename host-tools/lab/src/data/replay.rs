@@ -12,7 +12,7 @@ use tactus_core::features::{
 use tactus_core::rig::Rig;
 use tactus_core::table::SlideHash;
 
-use crate::data::quality::{Copies, Fingerprint, check};
+use crate::data::quality::{DuplicateSearch, Fingerprint, check};
 use crate::data::recording::{Labels, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingSet};
@@ -188,7 +188,7 @@ fn measure_each<T: Send>(
         done(texture);
         Ok((prints, measured))
     })?;
-    let mut copies = Copies::default();
+    let mut copies = DuplicateSearch::default();
     for (texture, (prints, _)) in set.textures().iter().zip(&measured) {
         for (number, print) in prints {
             let added = copies.add(print, slide_name(texture, *number));

@@ -17,7 +17,7 @@ pub struct Entry {
     pub step: String,
     /// When, as 2026-11-24T19:30:00Z.
     pub at: String,
-    /// Whether nothing is wrong.
+    /// True if nothing is wrong.
     pub passed: bool,
     /// What was seen.
     pub saw: String,
@@ -96,7 +96,7 @@ impl Journal {
         Ok(Self { file, entries })
     }
 
-    /// Whether a step has passed when it ran last.
+    /// True if a step has passed when it ran last.
     pub fn has_passed(&self, key: &str) -> bool {
         self.last(key).is_some_and(|entry| entry.passed)
     }

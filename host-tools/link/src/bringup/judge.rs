@@ -67,7 +67,7 @@ impl Finding {
         self
     }
 
-    /// Whether nothing is wrong.
+    /// True if nothing is wrong.
     pub fn passed(&self) -> bool {
         self.named.is_empty()
     }
@@ -246,7 +246,7 @@ fn state(open: bool) -> &'static str {
     if open { "open" } else { "closed" }
 }
 
-/// Whether the emergency stop takes the motors' supply, by a person's word.
+/// True if the emergency stop takes the motors' supply, by a person's word.
 pub fn stop(seen: bool, supply_gone: bool) -> Finding {
     let gone = if supply_gone { "gone" } else { "still there" };
     Finding::new(format!(
@@ -310,7 +310,7 @@ pub fn rest(look: &Look) -> Finding {
         .wrong(rms > CURRENT_RMS, &m::CURRENT_NOISE, "")
 }
 
-/// Whether the finger was squeezed in the hand.
+/// True if the finger was squeezed in the hand.
 pub fn squeezed(done: Result<(), Stopped>) -> Finding {
     let saw = match done {
         Ok(()) => "squeezed, and left alone".to_owned(),
@@ -460,7 +460,7 @@ pub(crate) fn stage_sense(right: &StageSeen, left: &StageSeen, went: Went) -> Fi
     }
 }
 
-/// Whether the bridge brakes, a move to each side.
+/// True if the bridge brakes, a move to each side.
 pub fn bridge(right: &StageSeen, left: &StageSeen) -> Finding {
     let saw = format!(
         "{:.0} and {:.0} mA without duty, the stage still moving{}{}",

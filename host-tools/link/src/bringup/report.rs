@@ -15,7 +15,7 @@ use crate::whole::write_whole;
 pub struct Report {
     /// Version of this program.
     version: &'static str,
-    /// Whether all steps have passed.
+    /// True if all steps have passed.
     passed: bool,
     steps: Vec<ReportStep>,
 }

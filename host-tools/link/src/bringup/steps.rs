@@ -470,7 +470,7 @@ impl Bench<'_> {
         Ok(ask!(self, Measure::Sensor, Sensor))
     }
 
-    /// Whether the person squeezed the finger, which is off its mount.
+    /// True if the person squeezed the finger, which is off its mount.
     fn squeeze(&mut self) -> Result<Result<(), Stopped>, Trouble> {
         // P_DC's rest is that of the last second of words
         self.person

@@ -140,7 +140,7 @@ impl Model {
         })
     }
 
-    /// Whether this is left by a cut in `operation`: deleting goes record by record.
+    /// True if this is left by a cut in `operation`: deleting goes record by record.
     fn is_between(&self, before: &Self, after: &Self, operation: &Operation) -> bool {
         let mut like = before.clone();
         if let Operation::Forget(name) = *operation {

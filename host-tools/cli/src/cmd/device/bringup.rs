@@ -18,7 +18,7 @@ use super::bench::{Bench, BenchError, Interrupt};
 use super::line::{Open, Where};
 use crate::cmd::output::Format;
 use crate::cmd::printed::{prompt as ask_for, say};
-use tactus_lab::data::whole::Made;
+use tactus_lab::data::whole::NewOutputs;
 
 /// Bring up a new rig: check its parts and wires step by step, and name what is wrong
 #[derive(clap::Args)]
@@ -51,7 +51,7 @@ const TRIES: u32 = 3;
 const HELLO: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (mut made, path) = (Made::default(), how.report.join("journal.jsonl"));
+    let (mut made, path) = (NewOutputs::default(), how.report.join("journal.jsonl"));
     let begun = made.folder(&how.report);
     made.file(path.clone());
     let begun = begun.and_then(|()| Journal::open(&path));

@@ -66,7 +66,7 @@ pub enum Upset {
     Halt {
         /// How long.
         ms: u64,
-        /// Whether the watchdog stands, too.
+        /// True if the watchdog stands, too.
         watchdog_stands: bool,
     },
     /// The supply of chip and motors is gone for so long: the chip starts anew.
@@ -102,7 +102,7 @@ impl Upset {
         kinds.choose(random).copied().unwrap_or(kinds[0])
     }
 
-    /// Whether the chip may start anew by it, or an answer be lost.
+    /// True if the chip may start anew by it, or an answer be lost.
     fn interrupts(self) -> bool {
         !matches!(self, Self::Button { .. })
     }

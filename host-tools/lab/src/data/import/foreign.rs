@@ -13,7 +13,7 @@ use super::cut::Parts;
 use super::resample::RATES_HZ;
 use super::settings::{Named, SETTINGS, Settings};
 use super::signals::Signals;
-use crate::data::quality::{Copies, Fingerprint, check};
+use crate::data::quality::{DuplicateSearch, Fingerprint, check};
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
@@ -143,8 +143,8 @@ impl Source {
     }
 }
 
-/// How all files are read, the channels that may be the vibration, their kind and what it says: by the first one that
-/// can be read.
+/// Finds how all files are read, the channels that may be the vibration, their kind and what it says: by the first one
+/// that can be read.
 fn first(
     source: &Source,
     paths: &[(String, Named)],
@@ -322,7 +322,7 @@ impl Survey {
         let places = self.textures.iter().zip(0..);
         let places: HashMap<&String, usize> = places.collect();
         let mut numbers = vec![0_u32; self.textures.len()];
-        let (mut copies, mut left_out) = (Copies::default(), Vec::new());
+        let (mut copies, mut left_out) = (DuplicateSearch::default(), Vec::new());
         // the parts of a file lie next to each other
         for parts in self.found.chunk_by(|a, b| a.path == b.path) {
             let (signals, place) = self.source.signals(&parts[0].path, &self.settings)?;

@@ -22,7 +22,7 @@ use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
-use crate::data::whole::{Lock, Made, sync_folder};
+use crate::data::whole::{Lock, NewOutputs, sync_folder};
 
 const ROWS: &str = "manifest.csv.part";
 const LOCK: &str = "INCOMPLETE.lock";
@@ -42,7 +42,7 @@ pub struct RecordingWriter {
     by_hand: bool,
     /// no other command writes into the folder; it goes before what is made, which may be the folder
     _lock: Lock,
-    made: Made,
+    made: NewOutputs,
 }
 
 impl RecordingWriter {
@@ -56,7 +56,7 @@ impl RecordingWriter {
         for texture in &textures {
             check_text(&folder.join(MANIFEST), "texture", &texture.name)?;
         }
-        let mut made = Made::default();
+        let mut made = NewOutputs::default();
         made.folder(folder).map_err(|e| io_error(folder, e))?;
         let lock = Lock::take(&folder.join(LOCK)).map_err(|why| match why.kind() {
             ErrorKind::ResourceBusy => {
@@ -236,7 +236,7 @@ impl Drop for RecordingWriter {
     }
 }
 
-fn put(folder: &Path, name: &str, bytes: &[u8], made: &mut Made) -> Result<()> {
+fn put(folder: &Path, name: &str, bytes: &[u8], made: &mut NewOutputs) -> Result<()> {
     let path = folder.join(name);
     made.file(path.clone());
     fs::write(&path, bytes).map_err(|e| io_error(&path, e))

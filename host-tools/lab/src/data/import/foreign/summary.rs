@@ -54,7 +54,7 @@ pub(super) fn gains(
     Ok((gain, (pressure > SMALLEST).then(pressure_gain)))
 }
 
-/// What was found in the files that can be read, and why others are left out.
+/// Recordings of the files that can be read, and why others are left out.
 /// Errors: most files, or any signal in memory, cannot be read.
 pub(super) fn readable(
     looked: Vec<Result<Vec<Found>>>,

@@ -34,16 +34,16 @@ const LEAST: usize = 64;
 
 type Channels = Vec<(String, Vec<f64>)>;
 
-/// The way through the numbers of an array: how many rows, samples and channels, and steps from one to the next.
-struct Walk<'a> {
+/// A view of an array: how many rows, samples and channels, and elements from one to the next.
+struct StridedView<'a> {
     data: &'a [f64],
     rows: (usize, usize),
     samples: (usize, usize),
     channels: (usize, usize),
 }
 
-impl<'a> Walk<'a> {
-    /// Through an array of one recording: of two dimensions the longer one is time.
+impl<'a> StridedView<'a> {
+    /// That of one recording: of two dimensions the longer one is time.
     fn once(array: &'a Array) -> Option<Self> {
         let strides = array.strides();
         let (samples, channels) = match (&array.shape[..], &strides[..]) {
@@ -60,7 +60,7 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// Through one with a recording in each row: channels are behind the samples, or before them where these are fewer.
+    /// That of a recording in each row: channels are behind the samples, or before them where these are fewer.
     fn rows(array: &'a Array) -> Option<Self> {
         let strides = array.strides();
         let (rows, samples, channels) = match (&array.shape[..], &strides[..]) {
@@ -100,7 +100,7 @@ pub(super) fn npy(file: &[u8], most: usize) -> Result<Signals, String> {
     if array.numbers().is_none() {
         return Err("an array of words; save one of numbers".to_owned());
     }
-    let walk = Walk::once(&array).ok_or_else(|| {
+    let walk = StridedView::once(&array).ok_or_else(|| {
         let dimensions = array.shape.len();
         format!(
             "an array of {dimensions} dimensions; save one or two, or a .npz of X with a row for each slide, and y \
@@ -192,7 +192,7 @@ impl Arrays {
     /// A recording for each row of the largest array, if each has the name of its texture.
     fn slides(&self, most: usize) -> Result<Option<Signals>, String> {
         let wide = self.0.iter().filter_map(|(_, array)| {
-            let walk = Walk::rows(array)?;
+            let walk = StridedView::rows(array)?;
             let textures = self.labels(walk.rows.0, &TEXTURES)?;
             Some((walk, textures))
         });
@@ -238,7 +238,8 @@ impl Arrays {
                     runs.clear();
                 }
                 signals.words.push((name.clone(), runs));
-            } else if let Some(walk) = Walk::once(array).filter(|walk| Some(walk.samples.0) == rows)
+            } else if let Some(walk) =
+                StridedView::once(array).filter(|walk| Some(walk.samples.0) == rows)
             {
                 let channels = walk.channels(most)?;
                 let several = channels.len() > 1;

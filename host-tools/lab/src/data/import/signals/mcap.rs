@@ -14,7 +14,7 @@ const MAX_NAME: usize = 256;
 const APART_S: f64 = 0.1;
 
 #[derive(Default)]
-struct Read {
+struct SessionSamples {
     /// times and counts of P_AC
     pac: Vec<(f64, f64)>,
     pdc: Vec<(f64, f64)>,
@@ -27,7 +27,7 @@ struct Read {
 
 pub(super) fn read(file: &[u8], most: usize) -> Result<Signals, String> {
     let damaged = |why: mcap::McapError| format!("a damaged MCAP file ({why}); convert it again");
-    let mut read = Read::default();
+    let mut read = SessionSamples::default();
     for message in MessageStream::new(file).map_err(damaged)? {
         let message = message.map_err(damaged)?;
         let topic = message.channel.topic.as_str();
@@ -49,7 +49,7 @@ pub(super) fn read(file: &[u8], most: usize) -> Result<Signals, String> {
     Ok(read.signals())
 }
 
-impl Read {
+impl SessionSamples {
     fn take(&mut self, topic: &str, at: f64, body: &Value) {
         let number = |key: &str| body[key].as_f64().unwrap_or(f64::NAN);
         match topic {

@@ -1,5 +1,6 @@
 //! WAV: integers of 8 to 32 bits, floats of 32 and 64, any channels, also as RF64, as WAVE_FORMAT_EXTENSIBLE, with any
-//! other chunks, and of a recorder that was switched off before it wrote the length.
+//! other chunks, and of a recorder that was switched off before it wrote the length. (The library hound reads neither
+//! RF64 nor floats of 64 bits, nor what was not ended.)
 
 use super::{Signals, fits};
 
@@ -38,7 +39,7 @@ pub(super) fn read(file: &[u8], most: usize) -> Result<Signals, String> {
                 format = Some(Format::of(chunk)?);
             }
             // the length of the samples is the second of three of 64 bits
-            b"ds64" => long = body.get(8..).and_then(|b| b.first_chunk()).copied(),
+            b"ds64" => long = chunk_at(body, 8),
             b"data" => {
                 let format = format.ok_or_else(|| damaged("no format before its samples"))?;
                 let data = match long.filter(|_| length == ELSEWHERE) {
@@ -61,25 +62,20 @@ pub(super) fn read(file: &[u8], most: usize) -> Result<Signals, String> {
     Err(damaged("no samples in it"))
 }
 
-fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
-    bytes
-        .get(at..)?
-        .first_chunk()
-        .copied()
-        .map(u16::from_le_bytes)
+fn chunk_at<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..)?.first_chunk().copied()
 }
 
 fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
-    bytes
-        .get(at..)?
-        .first_chunk()
-        .copied()
-        .map(u32::from_le_bytes)
+    chunk_at(bytes, at).map(u32::from_le_bytes)
 }
 
 impl Format {
     fn of(chunk: &[u8]) -> Result<Self, String> {
-        let at = |n| u16_at(chunk, n).ok_or_else(|| damaged("no format"));
+        let at = |n| {
+            let bytes = chunk_at(chunk, n).ok_or_else(|| damaged("no format"))?;
+            Ok::<_, String>(u16::from_le_bytes(bytes))
+        };
         let kind = match at(0)? {
             // the kind is the begin of a longer name
             EXTENSIBLE => at(24)?,
