@@ -19,7 +19,9 @@ mod tables;
 #[path = "device/unix.rs"]
 mod unix;
 
+use std::fs;
 use std::io::Write as _;
+use std::path::Path;
 use std::process::Stdio;
 
 use serde_json::Value;
@@ -132,18 +134,21 @@ fn a_session_does_what_was_meant() {
 }
 
 #[test]
-#[ignore = "writes tests/golden/identify.jsonl.gz anew"]
-fn the_golden_log_of_an_exploration() {
+#[ignore = "writes two logs of tests/golden anew"]
+fn the_golden_logs_of_explorations() {
+    let golden = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden"));
     let bench = Bench::new(1000);
-    bench.printed("identify --learn --seed 5 --log log");
-    let golden = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/golden/identify.jsonl.gz"
-    );
-    let file = std::fs::File::create(golden).unwrap();
-    let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::best());
-    packed.write_all(&bench.at.read("log")).unwrap();
-    packed.finish().unwrap();
+    let paper = fs::read(golden.join("paper.tact")).unwrap();
+    bench.at.write("paper.tact", paper);
+    bench.printed("identify --learn --seed 5 --log identify");
+    bench.printed("table push paper.tact");
+    bench.printed("identify --method paper --threshold 0.9999 --seed 5 --log paper");
+    for name in ["identify", "paper"] {
+        let file = fs::File::create(golden.join(format!("{name}.jsonl.gz"))).unwrap();
+        let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::best());
+        packed.write_all(&bench.at.read(name)).unwrap();
+        packed.finish().unwrap();
+    }
 }
 
 #[test]

@@ -13,7 +13,6 @@ use tactus_lab::sim::collection::{Collection, calibrated};
 use tactus_lab::sim::flash::{RamFlash, TABLE};
 use tactus_lab::sim::probe::{Host, switch_off_and_on, switch_on};
 use tactus_lab::sim::rig::SimRig;
-use tactus_tests::count;
 
 fn world() -> Collection {
     Collection::new(5, Collection::spread(47, 8), 5)
@@ -162,7 +161,7 @@ fn what_a_probe_cannot_verify_it_refuses_and_the_output_is_low() {
 fn told_new(known: &(RigCalibration, Vec<u8>), set: Option<f32>) -> usize {
     let known_ones = world().textures;
     let others = (1..=117).filter(|texture| !known_ones.contains(texture));
-    let others = others.step_by(4).take(count(24, 12) as usize);
+    let others = others.step_by(2).take(48);
     let is_new = |texture: &u8| {
         let identify = Identify {
             // one slide makes only what is far new, whatever the share

@@ -647,10 +647,10 @@ fn what_may_be_unknown_is_not_sure() {
 #[test]
 fn a_name_that_new_textures_too_often_get_is_not_told_as_sure() {
     let plain = axes();
-    let with_named = |share| {
+    let with_named = |low| {
         let new_named = Share {
-            share,
-            low: 0.0,
+            share: 0.5,
+            low,
             high: 1.0,
         };
         let figures = OpenSet {
