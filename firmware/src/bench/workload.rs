@@ -23,7 +23,7 @@ pub enum Workload {
     Nothing,
     /// Band-pass and mean power of the samples, in blocks.
     BandPower,
-    /// One frame of the spectrum: window, FFT, power accumulated.
+    /// One frame of the spectrum: window, FFT, power and bands.
     Frame,
     /// All features of a slide, in blocks.
     Slide,

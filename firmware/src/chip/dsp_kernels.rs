@@ -369,21 +369,20 @@ unsafe fn fold_fours(
 /// # Safety
 /// They are there.
 #[inline(never)]
-unsafe fn add_power_eights(bins: *const Complex32, sums: *mut f32, many: usize) {
+unsafe fn add_power_eights(bins: *const Complex32, powers: *mut f32, sums: *mut f32, many: usize) {
     // SAFETY: it reads and writes as many.
     unsafe {
         asm!(
             "2:",
             "vldmia {bins}!, {{s0-s15}}",
-            "vldmia {sums}, {{s16-s23}}",
-            "vmla.f32 s16, s0, s0",
-            "vmla.f32 s17, s2, s2",
-            "vmla.f32 s18, s4, s4",
-            "vmla.f32 s19, s6, s6",
-            "vmla.f32 s20, s8, s8",
-            "vmla.f32 s21, s10, s10",
-            "vmla.f32 s22, s12, s12",
-            "vmla.f32 s23, s14, s14",
+            "vmul.f32 s16, s0, s0",
+            "vmul.f32 s17, s2, s2",
+            "vmul.f32 s18, s4, s4",
+            "vmul.f32 s19, s6, s6",
+            "vmul.f32 s20, s8, s8",
+            "vmul.f32 s21, s10, s10",
+            "vmul.f32 s22, s12, s12",
+            "vmul.f32 s23, s14, s14",
             "vmla.f32 s16, s1, s1",
             "vmla.f32 s17, s3, s3",
             "vmla.f32 s18, s5, s5",
@@ -392,10 +391,21 @@ unsafe fn add_power_eights(bins: *const Complex32, sums: *mut f32, many: usize) 
             "vmla.f32 s21, s11, s11",
             "vmla.f32 s22, s13, s13",
             "vmla.f32 s23, s15, s15",
-            "vstmia {sums}!, {{s16-s23}}",
+            "vldmia {sums}, {{s0-s7}}",
+            "vstmia {powers}!, {{s16-s23}}",
+            "vadd.f32 s0, s0, s16",
+            "vadd.f32 s1, s1, s17",
+            "vadd.f32 s2, s2, s18",
+            "vadd.f32 s3, s3, s19",
+            "vadd.f32 s4, s4, s20",
+            "vadd.f32 s5, s5, s21",
+            "vadd.f32 s6, s6, s22",
+            "vadd.f32 s7, s7, s23",
+            "vstmia {sums}!, {{s0-s7}}",
             "cmp {sums}, {end}",
             "bne 2b",
             bins = inout(reg) bins => _,
+            powers = inout(reg) powers => _,
             sums = inout(reg) sums => _,
             end = in(reg) sums.add(many),
             out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
@@ -458,11 +468,11 @@ fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
     unsafe { fold_fours(angles, reals.as_ptr(), folded.as_mut_ptr(), many) };
 }
 
-fn add_power(bins: &[Complex32], sums: &mut [f32]) {
+fn add_power(bins: &[Complex32], powers: &mut [f32], sums: &mut [f32]) {
     let many = bins.len();
-    if many != sums.len() || many % 8 != 0 || many == 0 {
-        return (Kernels::PLAIN.add_power)(bins, sums);
+    if many != powers.len() || many != sums.len() || many % 8 != 0 || many == 0 {
+        return (Kernels::PLAIN.add_power)(bins, powers, sums);
     }
     // SAFETY: there are so many.
-    unsafe { add_power_eights(bins.as_ptr(), sums.as_mut_ptr(), many) };
+    unsafe { add_power_eights(bins.as_ptr(), powers.as_mut_ptr(), sums.as_mut_ptr(), many) };
 }

@@ -47,8 +47,8 @@ pub struct Kernels {
     pub transform_reals:
         for<'r> fn(angles: &Angles, reals: &'r mut Reals) -> &'r mut [Complex32; FRAME / 16],
 
-    /// Adds |X|^2 of each bin to its sum.
-    pub add_power: fn(bins: &[Complex32], sums: &mut [f32]),
+    /// Writes |X|^2 of each bin, and adds it to its sum.
+    pub add_power: fn(bins: &[Complex32], powers: &mut [f32], sums: &mut [f32]),
 }
 
 impl Kernels {
@@ -146,9 +146,10 @@ fn fold(angles: &Angles, reals: &[Complex32], folded: &mut [Complex32]) {
     }
 }
 
-fn add_power(bins: &[Complex32], sums: &mut [f32]) {
-    for (sum, bin) in sums.iter_mut().zip(bins) {
-        *sum = *sum + bin.re * bin.re + bin.im * bin.im;
+fn add_power(bins: &[Complex32], powers: &mut [f32], sums: &mut [f32]) {
+    for ((bin, power), sum) in bins.iter().zip(powers).zip(sums) {
+        *power = bin.re * bin.re + bin.im * bin.im;
+        *sum += *power;
     }
 }
 

@@ -117,6 +117,8 @@ struct FrameSum {
     real: [f32; 2],
     frames: u32,
     products: [Product; FUSED_BANDS],
+    /// Room for the powers of some bins of a frame: clearing it anew for each costs instructions.
+    of_a_frame: [f32; FRAME / 4],
 }
 
 impl FrameSum {
@@ -126,6 +128,7 @@ impl FrameSum {
         real: [0.0; 2],
         frames: 0,
         products: [Product::ONE; FUSED_BANDS],
+        of_a_frame: [0.0; FRAME / 4],
     };
 
     fn add(&mut self, plan: &Plan, folded: &mut Folded) {
@@ -137,30 +140,31 @@ impl FrameSum {
             ..
         } = plan.kernels;
         let angles = plan.angles();
-        let mut powers = [0.0; BINS - 1];
-        let ([odd_powers, even_powers], _) = powers.as_chunks_mut::<{ FRAME / 4 }>() else {
-            return;
+        let mut bands = [0.0; SLOTS];
+        let powers = &mut self.of_a_frame;
+        let (mut sums, mut band_of) = (&mut self.powers[..], &BAND_OF[..]);
+        let mut add_power = |bins: &[microfft::Complex32]| {
+            let many = bins.len();
+            let sums = sums.split_off_mut(..many).unwrap_or_default();
+            let band_of = band_of.split_off(..many).unwrap_or_default();
+            let powers = powers.get_mut(..many).unwrap_or_default();
+            add_power(bins, powers, sums);
+            add_to_bands(&mut bands, powers, band_of);
         };
         let ([odd, reals], _) = folded.as_chunks_mut::<{ FRAME / 4 }>() else {
             return;
         };
         transform(angles, odd);
         let first = odd.first().copied().unwrap_or_default();
-        add_power(odd, odd_powers);
+        add_power(odd);
 
         fold(angles, reals, odd);
-        let ([odd_powers, even_powers], _) = even_powers.as_chunks_mut::<{ FRAME / 8 }>() else {
-            return;
-        };
         let ([odd, reals_2], _) = odd.as_chunks_mut::<{ FRAME / 8 }>() else {
             return;
         };
         transform(angles, odd);
-        add_power(odd, odd_powers);
+        add_power(odd);
 
-        let ([odd_powers, even_powers], _) = even_powers.as_chunks_mut::<{ FRAME / 16 }>() else {
-            return;
-        };
         let ([folded, ..], _) = reals.as_chunks_mut::<{ FRAME / 8 }>() else {
             return;
         };
@@ -169,7 +173,7 @@ impl FrameSum {
             return;
         };
         transform(angles, odd);
-        add_power(odd, odd_powers);
+        add_power(odd);
 
         let mut rest = [0.0; FRAME / 8];
         let ([early, late], _) = rest.as_chunks_mut::<{ FRAME / 16 }>() else {
@@ -186,27 +190,16 @@ impl FrameSum {
             self.last += ends.im * ends.im;
             ends.im = 0.0;
         }
-        add_power(eights, even_powers);
+        add_power(eights);
         let [real_0, real_1] = &mut self.real;
         *real_0 += mean;
         *real_1 += first.re;
         // of bin 1 without the frame's own mean, as far as a band has it
         let real = first.re - mean / WINDOW_BIN_0 * WINDOW_BIN_1;
         let without_mean = real * real + first.im * first.im;
-        self.add_powers(&powers, without_mean);
-    }
-
-    fn add_powers(&mut self, powers: &[f32; BINS - 1], first: f32) {
-        let mut bands = [0.0; SLOTS];
-        for ((sum, power), band) in self.powers.iter_mut().zip(powers).zip(BAND_OF) {
-            *sum += power;
-            if let Some(band) = bands.get_mut(usize::from(band) % SLOTS) {
-                *band += power;
-            }
-        }
         let [lowest, ..] = &mut bands;
-        *lowest = first;
-        for ((product, band), share) in self.products.iter_mut().zip(bands).zip(SHARES) {
+        *lowest = without_mean;
+        for ((product, band), share) in self.products.iter_mut().zip(&bands).zip(&SHARES) {
             product.multiply(band * share + FUSED_FLOOR);
         }
         self.frames += 1;
@@ -222,6 +215,24 @@ impl FrameSum {
         let [.., last] = &mut power;
         *last = self.last;
         power
+    }
+}
+
+/// Adds powers, of which there are a multiple of four, to their bands.
+#[inline(never)]
+fn add_to_bands(bands: &mut [f32; SLOTS], powers: &[f32], band_of: &[u8]) {
+    let mut add = |power: f32, band: u8| {
+        if let Some(band) = bands.get_mut(usize::from(band) % SLOTS) {
+            *band += power;
+        }
+    };
+    let (powers, _) = powers.as_chunks::<4>();
+    let (band_of, _) = band_of.as_chunks::<4>();
+    for (&[a, b, c, d], &[of_a, of_b, of_c, of_d]) in powers.iter().zip(band_of) {
+        add(a, of_a);
+        add(b, of_b);
+        add(c, of_c);
+        add(d, of_d);
     }
 }
 

@@ -72,17 +72,31 @@ impl Signal {
         // a run that is too long reaches over the ends of such a part: inside of it nothing needs to be counted
         const { assert!(BLOCK < FROZEN as usize) };
         for part in samples.chunks(BLOCK) {
-            let (low, high) = part
-                .iter()
-                .fold((i16::MAX, i16::MIN), |(low, high), sample| {
-                    (low.min(*sample), high.max(*sample))
-                });
-            self.low.take(low, low < self.low.value, part);
-            self.high.take(high, high > self.high.value, part);
+            if self.reaches_an_extreme(part) {
+                // as words, which cost less to compare
+                let (low, high) = part
+                    .iter()
+                    .fold((i32::MAX, i32::MIN), |(low, high), sample| {
+                        (low.min(i32::from(*sample)), high.max(i32::from(*sample)))
+                    });
+                let (low, high) = (low as i16, high as i16);
+                self.low.take(low, low < self.low.value, part);
+                self.high.take(high, high > self.high.value, part);
+            }
             self.count_standing(part);
             self.last = part.last().copied();
         }
         self.samples = self.samples.saturating_add(samples.len() as u32);
+    }
+
+    /// True if a sample is not between the extremes so far.
+    fn reaches_an_extreme(&self, part: &[i16]) -> bool {
+        let low = i32::from(self.low.value);
+        let between = (i32::from(self.high.value) - low - 1).max(0) as u32;
+        let is_out = |sample: &i16| (i32::from(*sample) - low - 1) as u32 >= between;
+        let (fours, rest) = part.as_chunks::<4>();
+        let any = |[a, b, c, d]: &[i16; 4]| is_out(a) || is_out(b) || is_out(c) || is_out(d);
+        fours.iter().any(any) || rest.iter().any(is_out)
     }
 
     fn count_standing(&mut self, part: &[i16]) {

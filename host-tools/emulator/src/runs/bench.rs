@@ -179,7 +179,7 @@ fn kernels(bench: &mut Bench, samples: &[i16]) -> anyhow::Result<Vec<Row>> {
         floor: Some(45.0),
         ..Kernel::new(name, "sample", Workload::BandPower, &[], samples)
     };
-    let name = "window, FFT, power accumulated";
+    let name = "window, FFT, power and bands";
     let frame = Kernel::new(name, "512 points", Workload::Frame, &[], samples);
     let name = "all features of a slide";
     let all = Kernel::new(name, "slide of 3 s", Workload::Slide, &[], samples);
