@@ -89,6 +89,8 @@ pub struct Config {
     ///
     /// [`Explorer::verification`]: super::Explorer::verification
     pub verify: bool,
+    /// True if the probe is to learn from it by itself: a name takes two slides at least, and whole ones.
+    pub learn: bool,
 }
 
 impl Default for Config {
@@ -102,6 +104,7 @@ impl Default for Config {
             open: false,
             false_alarm: None,
             verify: false,
+            learn: false,
         }
     }
 }

@@ -54,12 +54,13 @@ impl<const N: usize> Explorer<'_, N> {
         };
         let (log, posterior) = (self.log.clone(), self.posterior.clone());
         let (log_odds, slides, visits) = (self.log_odds, self.slides, self.episode.len());
+        let agreed = self.agreed;
         let look = self.compare(part, slide).map(|()| {
             self.slides = slides.saturating_add(1);
             self.as_it_stands()
         });
         (self.log, self.posterior) = (log, posterior);
-        (self.log_odds, self.slides) = (log_odds, slides);
+        (self.log_odds, self.slides, self.agreed) = (log_odds, slides, agreed);
         // one that was there before is another one's: a slide that ended early is the last of its exploration
         self.episode.truncate(visits);
         look.map(Some)
@@ -106,7 +107,7 @@ impl<const N: usize> Explorer<'_, N> {
             (Method::Paper, Some(_)) => 2,
             _ => return None,
         };
-        if self.candidates < 2 || self.config.verify {
+        if self.candidates < 2 || self.config.verify || self.config.learn {
             return None;
         }
         let made = self.actions.iter().position(|&a| a == action)?;

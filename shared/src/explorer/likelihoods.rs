@@ -1,7 +1,7 @@
 //! What a slide says about every candidate: likelihoods (eq. 4) of one property, of all properties, or of all features.
 
 use super::config::{Method, ObserveError};
-use super::episode::one_more;
+use super::episode::{Episode, MovementSums, one_more};
 use super::posterior::{Explorer, rebase};
 use super::student::{ShrinkagePrior, Student};
 use super::whitened;
@@ -164,6 +164,7 @@ impl<const N: usize> Explorer<'_, N> {
                 sums.paces = sums.paces.saturating_add(1);
             }
         }
+        self.agree(action.movement, &white, slide.pace);
         self.reset_to_prior();
         // the posterior is overwritten below
         let elsewhere = whitened::add_likelihoods(
@@ -185,6 +186,33 @@ impl<const N: usize> Explorer<'_, N> {
             None => can_tell.then(|| elsewhere - (top + self.mean_of(sum))),
         });
         Ok(())
+    }
+
+    /// Takes a slide into [`agreed`](Self::agreed).
+    fn agree(&mut self, movement: u8, white: &[i16], pace: Option<i16>) {
+        if !self.config.learn || self.slides > 0 && self.agreed.is_none() {
+            return;
+        }
+        let mut alone = Episode::new();
+        // one has room
+        let _ = alone.push(MovementSums {
+            pace: pace.map_or(0, i32::from),
+            paces: u8::from(pace.is_some()),
+            ..MovementSums::of(movement, 1, white)
+        });
+        self.reset_to_prior();
+        // the posterior is overwritten later
+        whitened::add_likelihoods(
+            &self.table,
+            &alone,
+            &self.novelty_models,
+            true,
+            &mut self.log,
+            &mut self.posterior,
+        );
+        let all = self.log.iter().zip(0..).max_by_key(|(log, _)| **log);
+        let lead = all.map(|(_, texture)| texture);
+        self.agreed = lead.filter(|lead| self.slides == 0 || self.agreed == Some(*lead));
     }
 
     pub(super) fn expected(

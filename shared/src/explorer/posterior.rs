@@ -26,6 +26,8 @@ const FLOOR: i32 = -(1 << 28);
 /// 2 and 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather
 /// than 1 or 2 was chosen on the BioTac recordings, one material left out, to keep false alarms below 3 %.
 const UNKNOWN_OVER: [f32; 2] = [2.0, 1.5];
+/// Slides from which the probe may learn by itself. Each begins at another place of the sample.
+const LEAST_TO_LEARN: u8 = 2;
 /// Log-odds up to which a verdict is certain enough to learn from.
 const CERTAIN: f32 = -2.0;
 /// Fewest slides after which a texture may be called unknown, unless it is [`FAR`].
@@ -111,6 +113,9 @@ pub struct Explorer<'t, const N: usize> {
     pub(super) failed: Vec<u8, MAX_MOVEMENTS>,
     pub(super) episode: Episode,
     pub(super) log_odds: Option<f32>,
+    /// The texture that each slide of the episode by itself is most like; `None` before the first one, and where they
+    /// disagree.
+    pub(super) agreed: Option<u16>,
     /// For Student's t: movement by movement, properties in their order.
     pub(super) shrinkage: Vec<ShrinkagePrior, MAX_ACTIONS>,
     /// For the fused method: what a texture that is not in the table is like, at every movement.
@@ -136,6 +141,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
             failed: Vec::new(),
             episode: Vec::new(),
             log_odds: None,
+            agreed: None,
             shrinkage: Vec::new(),
             novelty_models: Vec::new(),
             limits: None,
@@ -154,6 +160,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         self.failed = self.table.movements().map(|_| 0).collect();
         self.episode.clear();
         self.log_odds = None;
+        self.agreed = None;
         if self.config.method == Method::Fused {
             // one for each action; those of shorter slides are behind them
             self.novelty_models.truncate(self.actions.len());
@@ -201,7 +208,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
     /// There is none before the first slide, however few the candidates.
     pub fn verdict(&self) -> Option<Verdict> {
         let best = self.best();
-        let sure = (best.sure || best.most_like) && self.slides > 0;
+        let least = if self.config.learn { LEAST_TO_LEARN } else { 1 };
+        let sure = (best.sure || best.most_like) && self.slides >= least;
         let enough = self.limits.is_some() || self.slides >= UNKNOWN_SLIDES;
         let unknown = best.unknown && enough;
         (sure || unknown || self.slides >= self.config.max_slides).then_some(best)
@@ -316,8 +324,8 @@ impl<'t, const N: usize> Explorer<'t, N> {
         Some(elsewhere - top as f32 / 65536.0)
     }
 
-    /// True if the posterior is certain enough for the probe to learn from it by itself. Never by the paper's
-    /// properties alone: one in ten such updates would be wrong.
+    /// True if the verdict needs no word of the user's. Never by the paper's properties alone: one in ten updates by
+    /// them would be wrong.
     pub fn is_certain(&self) -> bool {
         let known = if self.is_calibrated() {
             self.fits() && !self.is_changed()
@@ -325,6 +333,13 @@ impl<'t, const N: usize> Explorer<'t, N> {
             self.log_odds.is_some_and(|log_odds| log_odds <= CERTAIN)
         };
         known && !self.is_guarded() && self.best().probability > self.config.threshold
+    }
+
+    /// True if the probe may learn from it by itself: it [is certain](Self::is_certain) after two slides or more, and
+    /// each of them by itself is most like the texture.
+    pub fn may_learn(&self) -> bool {
+        let agreed = self.agreed == Some(self.best().texture);
+        self.slides >= LEAST_TO_LEARN && agreed && self.is_certain()
     }
 
     /// The movements made, with the number of slides and their whitened mean: what a fused table can learn from this

@@ -229,7 +229,7 @@ impl<'p> Slide<'p> {
     }
 
     /// The properties, when the steady part is over.
-    pub fn finish(mut self) -> Result<Measurement, SlideError> {
+    pub fn finish(&mut self) -> Result<Measurement, SlideError> {
         self.look(self.steady.end.saturating_sub(self.steady.start))
     }
 

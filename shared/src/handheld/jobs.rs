@@ -109,6 +109,8 @@ pub fn words(why: &MemoryError) -> &'static str {
         MemoryError::Unknown(_) | MemoryError::Taken(_) | MemoryError::LastTexture => {
             "The textures do not allow that."
         }
+        // only a host asks it to learn by itself
+        MemoryError::Walked(_) | MemoryError::Together => "It may have changed. Teach it.",
         MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",
         MemoryError::NoTable(_) | MemoryError::Table(_) => {
             "The textures cannot be read. Load them with a computer."

@@ -552,9 +552,7 @@ impl<'p> Touch<'p> {
         self.take(last);
         let seconds = STEADY as f32 / RATE_HZ as f32;
         self.slide.set_pace(self.speed.pace(seconds, MOVEMENT));
-        let mut slide = Slide::new(self.plan, MOVEMENT);
-        slide.adopt(&self.slide);
-        match slide.finish() {
+        match self.slide.finish() {
             Ok(measurement) => Event::Slid(Observation::from(&measurement)),
             Err(SlideError::Silent) => Event::Frozen,
             Err(SlideError::Clipped { .. }) => Event::Again(Again::TooHard),

@@ -148,7 +148,7 @@ async fn slides<R: Rig, const N: usize>(
         let why = match made {
             Err(why) if !rig.recover(&why).await => return Err(ExploreError::Rig(why)),
             Err(why) => Rejection::Rig(why),
-            Ok(length) => match early::measure(slide, length) {
+            Ok(length) => match early::measure(&mut slide, length) {
                 Err(why) => Rejection::Slide(why),
                 Ok(measurement) => match early::observe(explorer, action, length, &measurement) {
                     Err(why) => Rejection::Observe(why),

@@ -71,7 +71,7 @@ where
     let episode = EpisodeSummary {
         table: table.crc(),
         texture: verdict.texture,
-        certain: explorer.is_certain(),
+        certain: explorer.may_learn(),
         observed: up_to(explorer.observed()),
         paces: up_to(explorer.paces()),
     };

@@ -258,10 +258,10 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         episode: &EpisodeSummary,
         events: &mut impl Events,
     ) {
-        let Ok(store) = &mut self.store else {
+        let Ok((store, base, buffer)) = self.lend() else {
             return;
         };
-        match teach::learn_by_itself(episode, store, self.buffer).await {
+        match teach::learn_by_itself(episode, &base, store, buffer).await {
             Ok(Some(learned)) => {
                 self.publish(events);
                 events.tell(learned);

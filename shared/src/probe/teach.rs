@@ -56,11 +56,13 @@ pub async fn put_in_force<F: NorFlash>(
     Ok(length)
 }
 
-/// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`.
-/// Returns the event to send; `None` where there is nothing to learn. Errors: the store failed; the table in force is
-/// as it was.
+/// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`; `base`
+/// is the stored table, which a person taught. Returns the event to send; `None` where there is nothing to learn.
+/// Errors: the texture has walked too far, or many have walked together ([`walk`]), or the store failed; the table in
+/// force is as it was.
 pub(crate) async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
+    base: &Table<'_>,
     store: &mut Store<F>,
     buffer: &mut [u8],
 ) -> Result<Option<Event>, MemoryError> {
@@ -94,6 +96,20 @@ pub(crate) async fn learn_by_itself<F: NorFlash>(
         return Ok(None);
     }
     let name = name_of(table.name(texture).unwrap_or_default());
+    if walk::is_too_far(base, texture, &record) {
+        return Err(MemoryError::Walked(name));
+    }
+    let mut together = walk::Together::default();
+    together.take(base, &record);
+    let mut each = |kept: SelfLearnedRecord| {
+        if kept.number != number {
+            together.take(base, &kept);
+        }
+    };
+    store.self_learned(lineage, &mut each).await?;
+    if together.is_so() {
+        return Err(MemoryError::Together);
+    }
     let before = table.tally(texture);
     let tally = Tally {
         itself: before.itself.saturating_add(learned),
@@ -299,3 +315,4 @@ fn name_of(name: &str) -> Name {
 
 #[cfg(test)]
 mod tests;
+mod walk;

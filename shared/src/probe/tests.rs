@@ -169,11 +169,12 @@ fn fused_table() -> vec::Vec<u8> {
 #[test]
 fn a_fused_exploration_says_whether_it_is_certain() {
     let bytes = fused_table();
-    let explored = |slides: &[Option<i16>], open| {
+    let explored = |slides: &[Option<i16>], open, learn| {
         let mut told = vec::Vec::new();
         let wanted = Identify {
             method: None,
             open,
+            learn,
             ..wanted(&[])
         };
         let (episode, found) = block_on(identify(
@@ -189,7 +190,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
         assert_eq!(leading, Some(found.verdict.texture));
         (episode, told.pop().unwrap())
     };
-    let (episode, verdict) = explored(&[Some(10_000)], true);
+    let (episode, verdict) = explored(&[Some(10_000)], true, false);
     let Event::Verdict(Verdict {
         texture: 2,
         sure: true,
@@ -206,14 +207,18 @@ fn a_fused_exploration_says_whether_it_is_certain() {
     let table = Table::read(&bytes).unwrap();
     assert_eq!(
         (episode.table, episode.texture, episode.certain),
-        (table.crc(), 2, true)
+        (table.crc(), 2, false)
     );
     let (movement, slides, mean) = &episode.observed[0];
     assert_eq!((episode.observed.len(), *movement, *slides), (1, 0, 1));
     let mean = mean.iter().zip(table.white_mean(2, 0));
     assert!(mean.clone().count() == 27 && mean.clone().all(|(a, b)| a.abs_diff(b) <= 1));
+    // to learn from it takes one more
+    let (episode, verdict) = explored(&[Some(10_000), Some(10_100)], true, true);
+    assert!(matches!(verdict, Event::Verdict(Verdict { slides: 2, .. })));
+    assert!(episode.certain && episode.observed[0].1 == 2);
     // far from all
-    let (episode, verdict) = explored(&[Some(-32_000), Some(-32_000)], true);
+    let (episode, verdict) = explored(&[Some(-32_000), Some(-32_000)], true, true);
     let Event::Verdict(Verdict {
         texture: 0,
         sure: false,
@@ -227,7 +232,7 @@ fn a_fused_exploration_says_whether_it_is_certain() {
     };
     assert!(!episode.certain);
     assert_eq!(episode.observed[0].1, 2);
-    let (episode, verdict) = explored(&[Some(-32_000)], false);
+    let (episode, verdict) = explored(&[Some(-32_000), Some(-32_000)], false, true);
     let Event::Verdict(Verdict {
         texture: 0,
         sure: true,

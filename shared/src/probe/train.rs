@@ -65,7 +65,7 @@ where
         let measured = match made {
             Err(why) if !rig.recover(&why).await => return Err(Failure::Rig(why)),
             Err(why) => Err(Rejection::Rig(why)),
-            Ok(()) => take(&mut training, &table, slide),
+            Ok(()) => take(&mut training, &table, &mut slide),
         };
         match measured {
             Ok((training_record, measurement)) => {
@@ -120,7 +120,7 @@ async fn keep<F: NorFlash>(
 fn take(
     training: &mut Training,
     table: &Table<'_>,
-    slide: Slide<'_>,
+    slide: &mut Slide<'_>,
 ) -> Result<(TrainingRecord, Measurement), Rejection> {
     let movement = slide.movement();
     let measurement = slide.finish().map_err(Rejection::Slide)?;

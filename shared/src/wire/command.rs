@@ -139,6 +139,7 @@ impl Identify {
             max_slides: self.max_slides,
             open: self.open,
             false_alarm: self.false_alarm.filter(|share| is_false_alarm(*share)),
+            learn: self.learn,
             ..Config::default()
         }
     }

@@ -106,6 +106,16 @@ pub enum MemoryError {
          or go back to the firmware's"
     )]
     Unread,
+    #[error(
+        "{0} has moved as far from what was taught as it may by itself: if it is {0}, say so with \
+         `tactus device teach`, or undo with `tactus device forget --self-learned`"
+    )]
+    Walked(Name),
+    #[error(
+        "all textures that it learned by itself have moved the same way, so finger, rig or drive has changed: nothing \
+         is learned until `tactus device refresh`"
+    )]
+    Together,
 }
 
 /// Why a slide does not count; `E` is why a rig failed.

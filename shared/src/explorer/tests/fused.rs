@@ -148,6 +148,7 @@ impl Recipe {
 const OPEN: Config = Config {
     false_alarm: None,
     verify: false,
+    learn: false,
     method: Method::Fused,
     strategy: Strategy::Bayesian,
     threshold: 0.99,
@@ -712,6 +713,40 @@ fn it_learns_by_itself_only_where_it_is_certain() {
         assert!(explorer.best().probability > 0.99, "{method:?}");
         assert!(!explorer.is_certain() && explorer.log_odds().is_none());
         assert_eq!(explorer.observed().count(), 0);
+    }
+}
+
+#[test]
+fn it_learns_from_two_slides_that_agree() {
+    let bytes = axes();
+    let learn = Config {
+        learn: true,
+        ..OPEN
+    };
+    let after = |slides: &[[f64; 3]], config| {
+        let mut explorer = fused(&bytes, config);
+        for z in slides {
+            assert!(!explorer.may_learn() && explorer.verdict().is_none());
+            explorer.observe(look(0), &at(z)).unwrap();
+        }
+        (explorer.may_learn(), explorer.verdict().is_some())
+    };
+    let own = [6.0, 0.2, 0.0];
+    assert_eq!(after(&[own], learn), (false, false));
+    assert_eq!(after(&[own, own], learn), (true, true));
+    assert_eq!(
+        after(&[own], OPEN),
+        (false, true),
+        "it need not make another"
+    );
+    // both together are certain, and each by itself is most like another one, before or behind
+    let (other, rest) = ([2.6, 3.4, 0.0], [9.4, -3.4, 0.0]);
+    for slides in [[other, rest], [rest, other]] {
+        let mut explorer = fused(&bytes, learn);
+        for z in slides {
+            explorer.observe(look(0), &at(&z)).unwrap();
+        }
+        assert!(explorer.is_certain() && !explorer.may_learn());
     }
 }
 

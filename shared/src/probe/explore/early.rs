@@ -47,7 +47,7 @@ pub(super) async fn perform<R: Rig, const N: usize>(
 
 /// What a slide says that ended at this length, or at its end.
 pub(super) fn measure(
-    mut slide: Slide<'_>,
+    slide: &mut Slide<'_>,
     length: Option<Length>,
 ) -> Result<Measurement, SlideError> {
     match length {

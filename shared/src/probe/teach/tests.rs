@@ -186,7 +186,7 @@ fn it_learns_by_itself_by_the_recipe() {
     let mut total = 0;
     for observed in episodes {
         let episode = summary(&force, 2, observed);
-        let told = block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
+        let told = block_on(learn_by_itself(&episode, &old, &mut store, &mut force)).unwrap();
         let mut slides = 0;
         for &(movement, count, z) in observed.iter().filter(|f| f.0 != 0) {
             slides += count;
@@ -227,6 +227,7 @@ fn it_learns_by_itself_by_the_recipe() {
 #[test]
 fn nothing_is_learned_that_is_not_certain() {
     let bytes = base();
+    let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
     let mut force = buffer(&bytes);
     let observed = [(1, 1, [100, 1400, -300])];
@@ -244,7 +245,7 @@ fn nothing_is_learned_that_is_not_certain() {
     let before = flash.bytes.clone();
     store = block_on(Store::open(flash)).unwrap();
     for episode in [uncertain, changed, nothing] {
-        let told = block_on(learn_by_itself(&episode, &mut store, &mut force));
+        let told = block_on(learn_by_itself(&episode, &old, &mut store, &mut force));
         assert_eq!(told, Ok(None));
     }
     assert_eq!(force, buffer(&bytes));
@@ -253,16 +254,69 @@ fn nothing_is_learned_that_is_not_certain() {
     // twice from one episode: the table is another one after the first time
     let mut store = block_on(Store::open(flash.again())).unwrap();
     assert!(
-        block_on(learn_by_itself(&sure, &mut store, &mut force))
+        block_on(learn_by_itself(&sure, &old, &mut store, &mut force))
             .unwrap()
             .is_some()
     );
     let once = force.clone();
     assert_eq!(
-        block_on(learn_by_itself(&sure, &mut store, &mut force)),
+        block_on(learn_by_itself(&sure, &old, &mut store, &mut force)),
         Ok(None)
     );
     assert_eq!(force, once);
+}
+
+#[test]
+fn a_mean_walks_as_far_as_the_drift_and_no_farther() {
+    // of variance 0.5 in 3 axes, and 1/7 + 1/5 of the slides: 3 + 4 sqrt(6) = 12.8 = 3.9^2 of 0.843
+    for (bytes, most) in [(base(), 2.1), (calibrated(), 3.28)] {
+        let old = Table::read(&bytes).unwrap();
+        for (off, goes) in [(most - 0.03, true), (most + 0.03, false)] {
+            let mut store = store(&bytes);
+            let mut force = buffer(&bytes);
+            let at = [6 * 256, (off * 256.0) as i16, 0];
+            let mut told = Ok(None);
+            // until the mean is there
+            for _ in 0..40 {
+                let episode = summary(&force, 0, &[(0, 2, at)]);
+                let before = force.clone();
+                told = block_on(learn_by_itself(&episode, &old, &mut store, &mut force));
+                if told.is_err() {
+                    assert!(force == before && in_force(&mut store) == before[..bytes.len()]);
+                    break;
+                }
+            }
+            match goes {
+                true => assert_eq!(told, Ok(Some(learned_event("t0", 2, true))), "{off}"),
+                false => assert_eq!(told, Err(MemoryError::Walked(name_of("t0"))), "{off}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn textures_that_walk_together_stop_it_until_the_table_is_another() {
+    let bytes = calibrated();
+    let old = Table::read(&bytes).unwrap();
+    let learned = |ways: [[f64; 3]; 4]| {
+        let mut store = store(&bytes);
+        let mut force = buffer(&bytes);
+        let each = ways.iter().zip(0u16..).map(|(way, texture)| {
+            let mean = old.whitened(texture, 0).mean;
+            let at = [0, 1, 2].map(|axis| mean[axis] + (way[axis] * 256.0) as i16);
+            let mut told = Ok(None);
+            for _ in 0..10 {
+                let episode = summary(&force, texture, &[(0, 2, at)]);
+                told = block_on(learn_by_itself(&episode, &old, &mut store, &mut force));
+            }
+            told.is_ok()
+        });
+        each.collect::<List<bool>>()
+    };
+    // each goes as far, and none too far; but not the same way
+    let (way, back) = ([1.6, 1.0, 0.8], [-1.6, -1.0, -0.8]);
+    assert_eq!(learned([way, back, way, back]), [true; 4]);
+    assert_eq!(learned([way; 4]), [true, true, true, false]);
 }
 
 #[test]
@@ -273,7 +327,7 @@ fn a_label_updates_a_known_texture() {
     let mut force = buffer(&bytes);
     // it has learned one movement of it by itself before
     let episode = summary(&force, 1, &[(0, 2, [-1600, 40, 50])]);
-    block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
+    block_on(learn_by_itself(&episode, &old, &mut store, &mut force)).unwrap();
     let by_itself = Table::read_first(&force).unwrap().whitened(1, 0);
     let observed = [
         (0, 3, [-1500, 10, 20]),
@@ -404,7 +458,7 @@ fn textures_are_renamed_and_deleted() {
     let mut force = buffer(&bytes);
     for texture in [1, 3] {
         let episode = summary(&force, texture, &[(0, 1, [1, 2, 3])]);
-        block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
+        block_on(learn_by_itself(&episode, &old, &mut store, &mut force)).unwrap();
     }
     let learned = Table::read_first(&force).unwrap().whitened(3, 0);
     let refused = block_on(rename("elm", "oak", &old, &mut store, &mut force)).unwrap_err();
@@ -536,7 +590,7 @@ fn cut_in_an_answer(bytes: &[u8]) {
     let mut store = store(bytes);
     let mut force = buffer(bytes);
     let episode = summary(&force, 1, &[(0, 2, [-1600, 40, 50])]);
-    block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
+    block_on(learn_by_itself(&episode, &old, &mut store, &mut force)).unwrap();
     let ram = store.close().again();
     for name in ["t1", "elm"] {
         let episode = summary(&force, 1, &[(0, 3, [-1500, 10, 20]), (1, 1, [9, 8, 7])]);
@@ -580,20 +634,21 @@ fn cut_in_an_answer(bytes: &[u8]) {
 #[test]
 fn a_cut_while_it_learns_leaves_what_it_knew_or_what_it_learned() {
     let bytes = base();
+    let old = Table::read(&bytes).unwrap();
     let mut store = store(&bytes);
     let mut force = buffer(&bytes);
     let mut episode = summary(&force, 2, &[(1, 1, [100, 1400, -300])]);
-    block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap();
+    block_on(learn_by_itself(&episode, &old, &mut store, &mut force)).unwrap();
     episode = summary(&force, 2, &[(1, 1, [90, 1300, -200]), (2, 2, [4, 1500, 8])]);
     let before = in_force(&mut store);
     let ram = store.close().again();
     let mut after = force.clone();
     let mut whole = block_on(Store::open(ram.clone())).unwrap();
-    block_on(learn_by_itself(&episode, &mut whole, &mut after)).unwrap();
+    block_on(learn_by_itself(&episode, &old, &mut whole, &mut after)).unwrap();
     after.truncate(before.len());
     let operation = |store: &mut Store<Ram>| {
         let mut buffer = force.clone();
-        let told = block_on(learn_by_itself(&episode, store, &mut buffer));
+        let told = block_on(learn_by_itself(&episode, &old, store, &mut buffer));
         assert_eq!(told.is_err(), buffer == force, "as it was, if it failed");
         told.is_ok()
     };
@@ -613,12 +668,13 @@ fn a_cut_while_it_learns_leaves_what_it_knew_or_what_it_learned() {
 #[test]
 fn a_failing_flash_is_reported() {
     let bytes = base();
+    let old = Table::read(&bytes).unwrap();
     let mut flash = store(&bytes).close().again();
     flash.cut = Some((1, Torn::Nothing));
     let mut store = block_on(Store::open(flash)).unwrap();
     let mut force = buffer(&bytes);
     let episode = summary(&bytes, 2, &[(1, 1, [100, 1400, -300])]);
-    let why = block_on(learn_by_itself(&episode, &mut store, &mut force)).unwrap_err();
+    let why = block_on(learn_by_itself(&episode, &old, &mut store, &mut force)).unwrap_err();
     assert_eq!(why, MemoryError::Store(StoreError::Flash(FlashFault::Work)));
     assert_eq!(force, buffer(&bytes));
 }

@@ -514,13 +514,13 @@ fn what_the_probe_learns_by_itself_is_reported_and_in_force() {
     feels(&mut probe, &[10_000]);
     command(&mut probe, exploration(false)).unwrap();
     assert_eq!(probe.events.tables.len(), 1, "it was not to learn");
-    feels(&mut probe, &[10_000]);
+    feels(&mut probe, &[10_000, 10_000]);
     command(&mut probe, exploration(true)).unwrap();
     let after = *probe.events.tables.last().unwrap();
     assert!(before.crc != after.crc && after.factory);
     assert!(matches!(
         probe.events.told.last(),
-        Some(Event::TextureLearned(TextureLearned { itself: true, slides: 1, name })) if name == "t2"
+        Some(Event::TextureLearned(TextureLearned { itself: true, slides: 2, name })) if name == "t2"
     ));
     command(&mut probe, Command::Forget(Forget::SelfLearned)).unwrap();
     assert_eq!(*probe.events.tables.last().unwrap(), before);
@@ -685,7 +685,7 @@ fn a_table_comes_and_goes_in_parts_of_which_one_may_come_twice() {
 fn without_a_store_it_explores_and_says_that_it_cannot_learn() {
     let mut probe = probe_with(fused_table(), None);
     assert_eq!(probe.events.tables.last().unwrap().textures, 4);
-    feels(&mut probe, &[10_000]);
+    feels(&mut probe, &[10_000, 10_000]);
     command(&mut probe, exploration(true)).unwrap();
     assert!(
         matches!(
