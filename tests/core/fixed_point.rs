@@ -121,6 +121,7 @@ impl Oracle {
                     told: told(sure),
                     slides,
                     unknown_like: false,
+                    learns: false,
                 };
             }
         }
@@ -167,6 +168,7 @@ fn explore_fused(
                 told: told(sure),
                 slides: episode.slides() as u8,
                 unknown_like: episode.novel(trained),
+                learns: false,
             };
         }
     }

@@ -405,7 +405,7 @@ impl<'t> Follower<'t> {
 
     fn rejected(&mut self, slide: u8) -> Result<(), FollowError> {
         self.agreement.rejected += 1;
-        if let Some(samples) = self.samples.take()
+        if let Some(mut samples) = self.samples.take()
             && samples.finish().is_ok()
         {
             self.agreement.rejected_only_there += 1;

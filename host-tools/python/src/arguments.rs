@@ -56,7 +56,7 @@ pub(crate) fn features(name: Option<&str>) -> PyResult<Option<FeatureSet>> {
 pub(crate) fn drift((bands, traction): (f32, f32)) -> PyResult<Drift> {
     let drift = Some(Drift { bands, traction }).filter(|drift| drift.is_possible());
     drift.ok_or_else(|| {
-        PyValueError::new_err("drift: two numbers from 0 to 10, such as (0.1, 0.04), or (0, 0)")
+        PyValueError::new_err("drift: two numbers from 0 to 10, such as (0.12, 0.04), or (0, 0)")
     })
 }
 

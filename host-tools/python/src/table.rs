@@ -70,7 +70,7 @@ impl Table {
     /// Raises TableError where the slides make no table, RecordingError where they cannot be read.
     #[staticmethod]
     #[pyo3(signature = (recordings, labels=None, *, train_slides=None, method="fused", features=None,
-        drift=(0.1, 0.04), false_alarm=None))]
+        drift=(0.12, 0.04), false_alarm=None))]
     #[expect(
         clippy::too_many_arguments,
         reason = "all but the first two have names where it is called"
@@ -111,7 +111,7 @@ impl Table {
     /// Learns a table from features of one's own: a dict from the name of each texture to its list of `Features`. Each
     /// texture needs two slides at least of every movement that occurs. Arguments and errors as of `learn`.
     #[staticmethod]
-    #[pyo3(signature = (slides, *, method="fused", features=None, drift=(0.1, 0.04), false_alarm=None))]
+    #[pyo3(signature = (slides, *, method="fused", features=None, drift=(0.12, 0.04), false_alarm=None))]
     fn learn_slides(
         py: Python<'_>,
         slides: &Bound<'_, PyDict>,

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use anyhow::ensure;
 use clap::ValueEnum as _;
-use tactus_core::explorer;
+use tactus_core::explorer::{self, Config};
 use tactus_lab::eval::evaluation::{Evaluation, EvaluationRequest, evaluation};
 use tactus_lab::eval::open_set;
 use tactus_lab::eval::show::count;
@@ -21,12 +21,15 @@ mod verify;
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let is_fused = args.method.method() == explorer::Method::Fused;
     ensure!(
-        is_fused || !args.verify && args.novelty.is_none(),
-        "--novelty and --verify need --method fused: the other methods do not recognise new textures"
+        is_fused || !args.verify && !args.learn && args.novelty.is_none(),
+        "--novelty, --learn and --verify need --method fused: the other methods do not recognise new textures"
     );
     let canvas = args.plot.open()?;
     let (experiment, protocol) = experiment::open(args)?;
-    let config = args.stop.config(args.method);
+    let config = Config {
+        learn: args.learn,
+        ..args.stop.config(args.method)
+    };
     if args.verify {
         return verify::run(args, &experiment, protocol, config, canvas, out);
     }
@@ -89,6 +92,10 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
     )?;
     for (name, value) in verdict_rows(&e.verdicts) {
         writeln!(out, "{}", row(name, share(value)))?;
+    }
+    if let Some(updates) = e.updates {
+        writeln!(out, "{}", row("learned by itself", share(updates.made)))?;
+        writeln!(out, "{}", row("  wrongly", share(updates.wrong)))?;
     }
     writeln!(out, "where the texture is known to be one of these")?;
     let s = &e.summary;

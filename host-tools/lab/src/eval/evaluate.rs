@@ -82,12 +82,19 @@ pub struct Outcome {
     pub slides: u8,
     /// True if it would have been called unknown, had that been an answer.
     pub unknown_like: bool,
+    /// True if the probe would learn from it by itself.
+    pub learns: bool,
 }
 
 impl Outcome {
     /// The verdict, and true if the most probable texture is the right one.
     pub fn told(&self) -> (VerdictKind, bool) {
         (self.told, self.identified == self.unknown)
+    }
+
+    /// True if the probe would learn from it by itself, and true if it would learn the right texture.
+    pub fn learned(&self) -> (bool, bool) {
+        (self.learns, self.identified == self.unknown)
     }
 }
 
@@ -178,6 +185,7 @@ pub(crate) fn play_with<const N: usize>(
         told: verdict.kind(),
         slides: explorer.slides(),
         unknown_like: explorer.is_unknown(),
+        learns: explorer.may_learn(),
     }
 }
 
@@ -363,6 +371,7 @@ mod tests {
             },
             slides,
             unknown_like: slides == 4,
+            learns: false,
         };
         let names = ["a".to_owned(), "b".to_owned(), "c".to_owned()];
         let outcomes = [

@@ -10,7 +10,7 @@ use crate::eval::evaluate::{
 };
 use crate::eval::experiment::Experiment;
 use crate::eval::reliability::{Statements, statements};
-use crate::eval::verdicts::Verdicts;
+use crate::eval::verdicts::{Updates, Verdicts};
 
 pub use crate::eval::courses::Course;
 
@@ -39,6 +39,8 @@ pub struct Evaluation {
     pub open_set: Option<OpenSet>,
     /// Shares of the verdicts: the texture may be unknown, and no slide counts twice.
     pub verdicts: Verdicts,
+    /// Shares of these in which the probe would learn by itself; `null` unless it was to.
+    pub updates: Option<Updates>,
     /// Mean number of slides until then.
     pub mean_slides_told: f64,
     /// Reliability of the probabilities: share of right names by the stated probability.
@@ -90,6 +92,10 @@ pub fn evaluation(
     let stages = if request.with_courses { 3 } else { 2 };
     let mut played = Vec::new();
     stage([1, stages], &mut |done| {
+        let config = Config {
+            learn: false,
+            ..config
+        };
         played = evaluate_by(&experiment, config, runs, done, |explorer, run| {
             let at_once = is_right_at_once(explorer, run.clone());
             (play(explorer, config.strategy, run), at_once)
@@ -133,6 +139,7 @@ pub fn evaluation(
         seed: request.seed,
         open_set: experiment.open_set,
         verdicts: Verdicts::of(told.iter().map(Outcome::told)),
+        updates: (config.learn).then(|| Updates::of(told.iter().map(Outcome::learned))),
         mean_slides_told: Summary::new(&told, names, config.max_slides).mean_slides,
         one_slide_accuracy: right as f64 / at_once.len().max(1) as f64,
         summary,

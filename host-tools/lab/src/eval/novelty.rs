@@ -12,7 +12,7 @@ use tactus_core::table::OpenSet;
 
 use crate::eval::evaluate::{EvaluateError, explorer, play};
 use crate::eval::experiment::{Experiment, Run};
-use crate::eval::verdicts::Verdicts;
+use crate::eval::verdicts::{Updates, Verdicts};
 
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
@@ -39,6 +39,9 @@ pub struct Novelty {
     pub verdicts_new: Verdicts,
     /// Verdicts on textures that the table has.
     pub verdicts_known: Verdicts,
+    /// Shares of explorations of textures that were left out in which the probe would learn by itself, all wrongly;
+    /// `null` unless it was to.
+    pub updates_new: Option<Updates>,
 }
 
 /// Leaves one texture after the other out of the table, and presents it; and one that was not left out beside it.
@@ -87,7 +90,7 @@ pub fn leave_one_out(
                 let mut explorer = explorer(bytes, as_told.measured, open, None)?;
                 let outcome = play(&mut explorer, open.strategy, run);
                 let is_right = place(presented, out) == Some(outcome.identified);
-                Ok::<_, EvaluateError>((outcome.told, is_right))
+                Ok::<_, EvaluateError>((outcome.told, is_right, outcome.learns))
             };
             let told = [told(outs[0], &tables[0])?, told(outs[1], &tables[1])?];
             done();
@@ -106,7 +109,9 @@ pub fn leave_one_out(
         open_set: experiment.open_set,
         novelty: (0..SLIDES).map(after).collect(),
         verdicts_new: Verdicts::of_unknown(presented.iter().map(|(_, told)| told[0].0)),
-        verdicts_known: Verdicts::of(presented.iter().map(|(_, told)| told[1])),
+        verdicts_known: Verdicts::of(presented.iter().map(|(_, told)| (told[1].0, told[1].1))),
+        updates_new: (config.learn)
+            .then(|| Updates::of(presented.iter().map(|(_, told)| (told[0].2, false)))),
     })
 }
 

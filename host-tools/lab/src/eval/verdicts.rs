@@ -60,6 +60,29 @@ impl Verdicts {
     }
 }
 
+/// Shares of explorations from which the probe would learn by itself, 0 to 1.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Updates {
+    /// All of them.
+    pub made: f64,
+    /// Those that would move the mean of a wrong texture.
+    pub wrong: f64,
+}
+
+impl Updates {
+    /// Counts explorations, each with true if the probe would learn from it, and true if the texture is the right one.
+    pub fn of(learned: impl IntoIterator<Item = (bool, bool)>) -> Self {
+        let (mut made, mut wrong, mut all) = (0, 0, 0);
+        for (learns, is_right) in learned {
+            all += 1;
+            made += u32::from(learns);
+            wrong += u32::from(learns && !is_right);
+        }
+        let [made, wrong] = [made, wrong].map(|some| f64::from(some) / f64::from(all.max(1)));
+        Self { made, wrong }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,5 +112,16 @@ mod tests {
         };
         assert_eq!(Verdicts::of(told), expected);
         assert_eq!(Verdicts::of([]), Verdicts::default());
+    }
+
+    #[test]
+    fn an_update_is_wrong_only_where_it_is_made() {
+        let of = |learned: &[(bool, bool)]| {
+            let Updates { made, wrong } = Updates::of(learned.iter().copied());
+            (made, wrong)
+        };
+        let some = [(true, true), (true, false), (false, false), (false, true)];
+        assert_eq!(of(&some), (0.5, 0.25));
+        assert_eq!(of(&[]), (0.0, 0.0));
     }
 }

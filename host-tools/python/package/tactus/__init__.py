@@ -70,7 +70,7 @@ _DEFAULTS = {
     "threshold": 0.99,
     "max_slides": 10,
     "features": None,
-    "drift": (0.1, 0.04),
+    "drift": (0.12, 0.04),
     "false_alarm": None,
 }
 
@@ -103,7 +103,7 @@ def evaluate(recordings, labels=None, sessions=None, **arguments):
     runs: virtual explorations (8000). seed: of all draws (1).
     threshold: an exploration ends when a texture is more probable than this (0.99). max_slides: or after so many (10).
     features: "force", "pressure", "bands" or "properties"; the best that every slide has, unless given.
-    drift: standard deviations of band powers (ln) and of traction (share) from session to session (0.1, 0.04).
+    drift: standard deviations of band powers (ln) and of traction (share) from session to session (0.12, 0.04).
     false_alarm: share of known textures that may be taken for new ones; the table's own, unless given.
 
     Returns a dict with what `tactus evaluate --format json` prints, to the digit: shares 0 to 1, slides, `verdicts`,

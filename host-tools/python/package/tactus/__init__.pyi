@@ -163,7 +163,7 @@ class Table:
         train_slides: Optional[int] = None,
         method: str = "fused",
         features: Optional[str] = None,
-        drift: Tuple[float, float] = (0.1, 0.04),
+        drift: Tuple[float, float] = (0.12, 0.04),
         false_alarm: Optional[float] = None,
     ) -> Table: ...
     @staticmethod
@@ -172,7 +172,7 @@ class Table:
         *,
         method: str = "fused",
         features: Optional[str] = None,
-        drift: Tuple[float, float] = (0.1, 0.04),
+        drift: Tuple[float, float] = (0.12, 0.04),
         false_alarm: Optional[float] = None,
     ) -> Table: ...
     @staticmethod
@@ -207,7 +207,7 @@ def evaluate(
     threshold: float = 0.99,
     max_slides: int = 10,
     features: Optional[str] = None,
-    drift: Tuple[float, float] = (0.1, 0.04),
+    drift: Tuple[float, float] = (0.12, 0.04),
     false_alarm: Optional[float] = None,
 ) -> Dict[str, Any]: ...
 

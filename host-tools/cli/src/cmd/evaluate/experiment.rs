@@ -85,6 +85,9 @@ pub(crate) struct Args {
     /// It is one of the textures known, and the explorer knows it: nothing is told to be new, and names are told as sure
     #[arg(long, conflicts_with_all = ["novelty", "verify"])]
     pub(crate) closed: bool,
+    /// As with `identify --learn`: two slides at least; count how often the probe would learn by itself, and wrongly
+    #[arg(long, conflicts_with_all = ["verify", "closed"])]
+    pub(crate) learn: bool,
     /// Slides to learn from, per texture and movement: 5 unless given, or all training rows of --properties
     #[arg(long, value_name = "N")]
     pub(crate) train_slides: Option<usize>,

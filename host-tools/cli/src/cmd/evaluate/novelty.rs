@@ -91,6 +91,13 @@ pub(crate) fn leave_one_out(
     )?;
     writeln!(out, "  of a new texture    {}", in_words(new))?;
     writeln!(out, "  of a known one      {}", in_words(known))?;
+    if let Some(updates) = novelty.updates_new {
+        let share = updates.made * 100.0;
+        writeln!(
+            out,
+            "  of a new one it learns by itself, wrongly, in {share:.1} %"
+        )?;
+    }
     Ok(())
 }
 
