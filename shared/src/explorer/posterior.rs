@@ -335,11 +335,12 @@ impl<'t, const N: usize> Explorer<'t, N> {
         known && !self.is_guarded() && self.best().probability > self.config.threshold
     }
 
-    /// True if the probe may learn from it by itself: it [is certain](Self::is_certain) after two slides or more, and
-    /// each of them by itself is most like the texture.
+    /// True if the probe may learn from it by itself: it [is certain](Self::is_certain) after two slides or more,
+    /// each of them by itself is most like the texture, and the table would not name too many new textures.
     pub fn may_learn(&self) -> bool {
         let agreed = self.agreed == Some(self.best().texture);
-        self.slides >= LEAST_TO_LEARN && agreed && self.is_certain()
+        let may = self.table.open_set().is_none_or(|of| of.may_learn());
+        may && self.slides >= LEAST_TO_LEARN && agreed && self.is_certain()
     }
 
     /// The movements made, with the number of slides and their whitened mean: what a fused table can learn from this

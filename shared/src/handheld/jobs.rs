@@ -110,7 +110,9 @@ pub fn words(why: &MemoryError) -> &'static str {
             "The textures do not allow that."
         }
         // only a host asks it to learn by itself
-        MemoryError::Walked(_) | MemoryError::Together => "It may have changed. Teach it.",
+        MemoryError::Walked(_) | MemoryError::Together | MemoryError::NamesNew => {
+            "It may have changed. Teach it."
+        }
         MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",
         MemoryError::NoTable(_) | MemoryError::Table(_) => {
             "The textures cannot be read. Load them with a computer."

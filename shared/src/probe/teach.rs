@@ -58,7 +58,7 @@ pub async fn put_in_force<F: NorFlash>(
 
 /// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`; `base`
 /// is the stored table, which a person taught. Returns the event to send; `None` where there is nothing to learn.
-/// Errors: the texture has walked too far, or many have walked together ([`walk`]), or the store failed; the table in
+/// Errors: the table names too many new textures, the texture has walked too far, or many have walked together ([`walk`]), or the store failed; the table in
 /// force is as it was.
 pub(crate) async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
@@ -67,6 +67,9 @@ pub(crate) async fn learn_by_itself<F: NorFlash>(
     buffer: &mut [u8],
 ) -> Result<Option<Event>, MemoryError> {
     let table = Table::read_first(buffer)?;
+    if table.open_set().is_some_and(|of| !of.may_learn()) {
+        return Err(MemoryError::NamesNew);
+    }
     if !episode.certain || episode.table != table.crc() {
         return Ok(None);
     }

@@ -35,6 +35,12 @@ impl OpenSet {
     /// Bytes that the section takes, kind and length included.
     pub const LENGTH: usize = 4 + 3 * 12;
 
+    /// True if the probe may learn by itself: as far as is known at all, a new texture seldom gets a name, which the
+    /// probe would learn it under.
+    pub fn may_learn(&self) -> bool {
+        self.new_named.share <= MOST_NAMED
+    }
+
     /// Returns whether a name may be told as sure: it is not certain that too many new textures get one. The share of a
     /// few textures says little by itself: of twenty, four may be chance.
     pub fn may_name(&self) -> bool {

@@ -116,6 +116,11 @@ pub enum MemoryError {
          is learned until `tactus device refresh`"
     )]
     Together,
+    #[error(
+        "by its own figures this table would give too many new textures a name, and learn them under it: nothing is \
+         learned by itself. `tactus device table show` has the figures; more slides of each texture may help"
+    )]
+    NamesNew,
 }
 
 /// Why a slide does not count; `E` is why a rig failed.

@@ -723,14 +723,15 @@ fn it_learns_from_two_slides_that_agree() {
         learn: true,
         ..OPEN
     };
-    let after = |slides: &[[f64; 3]], config| {
-        let mut explorer = fused(&bytes, config);
+    let after_of = |bytes: &[u8], slides: &[[f64; 3]], config| {
+        let mut explorer = fused(bytes, config);
         for z in slides {
             assert!(!explorer.may_learn() && explorer.verdict().is_none());
             explorer.observe(look(0), &at(z)).unwrap();
         }
         (explorer.may_learn(), explorer.verdict().is_some())
     };
+    let after = |slides: &[[f64; 3]], config| after_of(&bytes, slides, config);
     let own = [6.0, 0.2, 0.0];
     assert_eq!(after(&[own], learn), (false, false));
     assert_eq!(after(&[own, own], learn), (true, true));
@@ -738,6 +739,22 @@ fn it_learns_from_two_slides_that_agree() {
         after(&[own], OPEN),
         (false, true),
         "it need not make another"
+    );
+    // nor where the table would name too many new textures
+    let new_named = Share {
+        share: 0.11,
+        low: 0.0,
+        high: 1.0,
+    };
+    let figures = OpenSet {
+        new_named,
+        ..OpenSet::default()
+    };
+    let mut out = vec![0; bytes.len() + OpenSet::LENGTH];
+    let table = with_open_set(&mut out, &Table::read(&bytes).unwrap(), &figures);
+    assert_eq!(
+        after_of(table.unwrap().as_bytes(), &[own, own], learn),
+        (false, true)
     );
     // both together are certain, and each by itself is most like another one, before or behind
     let (other, rest) = ([2.6, 3.4, 0.0], [9.4, -3.4, 0.0]);

@@ -6,7 +6,8 @@ use crate::store::tests::ram::{Ram, Torn};
 use crate::store::{FlashFault, StoreError, TrainingRecord};
 use crate::table::tests::{fused_of, known, straight};
 use crate::table::{
-    Drift, EPISODES, Limits, PAIRS, Population, Sections, Tail, TrainingStats, with_sections,
+    Drift, EPISODES, Limits, OpenSet, PAIRS, Population, Sections, Share, Tail, TrainingStats,
+    with_open_set, with_sections,
 };
 use embassy_futures::block_on;
 use std::string::ToString;
@@ -291,6 +292,34 @@ fn a_mean_walks_as_far_as_the_drift_and_no_farther() {
                 false => assert_eq!(told, Err(MemoryError::Walked(name_of("t0"))), "{off}"),
             }
         }
+    }
+}
+
+#[test]
+fn a_table_that_would_name_new_textures_learns_nothing_by_itself() {
+    let plain = base();
+    for (share, may) in [(0.1, true), (0.11, false)] {
+        let new_named = Share {
+            share,
+            low: 0.0,
+            high: 1.0,
+        };
+        let figures = OpenSet {
+            new_named,
+            ..OpenSet::default()
+        };
+        let mut out = vec![0; plain.len() + OpenSet::LENGTH];
+        let bytes = with_open_set(&mut out, &Table::read(&plain).unwrap(), &figures);
+        let bytes = bytes.unwrap().as_bytes().to_vec();
+        let old = Table::read(&bytes).unwrap();
+        let (mut store, mut force) = (store(&bytes), buffer(&bytes));
+        let episode = summary(&force, 2, &[(1, 2, [100, 1400, -300])]);
+        let told = block_on(learn_by_itself(&episode, &old, &mut store, &mut force));
+        match may {
+            true => assert_eq!(told, Ok(Some(learned_event("t2", 2, true)))),
+            false => assert_eq!(told, Err(MemoryError::NamesNew)),
+        }
+        assert_eq!(force == buffer(&bytes), !may);
     }
 }
 
