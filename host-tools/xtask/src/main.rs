@@ -62,6 +62,11 @@ enum Cli {
     /// error if a part misses a limit.
     #[command(after_help = campaign::EXAMPLES)]
     Campaign(campaign::Options),
+    /// Judge every data set that is there, with the defaults: the tables of the book's page of evidence
+    ///
+    /// What is told of known and of new textures, and one slide's forced name beside scikit-learn's classifiers, split
+    /// by split; a quarter of an hour on two cores. It needs Python and the data sets, see DATA.md.
+    Evidence(python::Evidence),
     /// Count what the core's kernels cost on the chip
     ///
     /// Instructions of the bench in the silicon image on the emulated board, the same code as in the rig's image, on a
@@ -109,6 +114,7 @@ fn main() -> ExitCode {
         Cli::Test { step: Some(name) } => test::one(&name),
         Cli::Emulate { options } => emulate::emulate(&options),
         Cli::Campaign(options) => campaign::campaign(&options),
+        Cli::Evidence(options) => python::evidence(&options),
         Cli::Bench(options) => bench::bench(&options),
         Cli::Size(options) => size::size(&options),
         Cli::Flash(options) => flash::flash(&options),

@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::emulate;
 use crate::shell::{self, cargo, root, run, target};
@@ -23,6 +23,18 @@ const THERE: &str =
     "import importlib.metadata as m, re, sys; m.version(re.split('[<>=]', sys.argv[1])[0])";
 /// Linux on 64-bit ARM.
 pub(crate) const ARM: &str = "aarch64-unknown-linux-gnu";
+
+#[derive(clap::Args)]
+pub(crate) struct Evidence {
+    /// Only these of biotac, fabricslide, boreal, worlds and simulated
+    sets: Vec<String>,
+    /// Folder of the data sets; TACTUS_DATA or ../shared/data unless given
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Write tables and picture into the book, in place of printing the tables
+    #[arg(long, conflicts_with = "sets")]
+    write: bool,
+}
 
 /// Lints the package, has pip build and install it, and runs its tests. Skipped where there is no Python or no way to
 /// what pip needs; in CI that is an error.
@@ -60,6 +72,43 @@ pub(crate) fn check() -> Result<()> {
         .args(["--", "device::package::"])
         .env("TACTUS_PYTHON", python);
     run(&mut session)
+}
+
+/// Runs `docs/evidence.py` on the data sets, with this command and this package.
+pub(crate) fn evidence(options: &Evidence) -> Result<()> {
+    let data = options
+        .data
+        .clone()
+        .or_else(|| std::env::var_os("TACTUS_DATA").map(PathBuf::from));
+    let data = data.unwrap_or_else(|| root().join("../shared/data"));
+    ensure!(
+        data.is_dir(),
+        "{}: no such folder; --data or TACTUS_DATA says where the data sets are (DATA.md)",
+        data.display()
+    );
+    let python = environment()?;
+    ensure!(
+        has(&python, "scikit-learn"),
+        "scikit-learn cannot be installed, and ours is shown beside it"
+    );
+    run(cargo().args([
+        "build",
+        "--release",
+        "--package",
+        "tactus-probe",
+        "--bin",
+        "tactus",
+    ]))?;
+    run(pip(&python).arg(root().join(PACKAGE)))?;
+    let mut judge = Command::new(&python);
+    judge.arg(root().join("docs/evidence.py"));
+    judge
+        .arg(target().join("release").join(program("tactus")))
+        .arg(data);
+    if options.write {
+        judge.arg("--write").arg(root().join("docs/src"));
+    }
+    run(judge.args(&options.sets))
 }
 
 /// An error where there is nothing here that builds the package.

@@ -80,8 +80,9 @@ impl Signal {
                         (low.min(i32::from(*sample)), high.max(i32::from(*sample)))
                     });
                 let (low, high) = (low as i16, high as i16);
-                self.low.take(low, low < self.low.value, part);
-                self.high.take(high, high > self.high.value, part);
+                let first = self.last.is_none();
+                self.low.take(low, first || low < self.low.value, part);
+                self.high.take(high, first || high > self.high.value, part);
             }
             self.count_standing(part);
             self.last = part.last().copied();
@@ -97,6 +98,12 @@ impl Signal {
         let (fours, rest) = part.as_chunks::<4>();
         let any = |[a, b, c, d]: &[i16; 4]| is_out(a) || is_out(b) || is_out(c) || is_out(d);
         fours.iter().any(any) || rest.iter().any(is_out)
+    }
+
+    /// True if all samples are of two neighbouring counts: a dead converter may go to and fro between them, and a sliding
+    /// finger's signal has noise of more than one.
+    pub fn is_flat(&self) -> bool {
+        self.high.value.saturating_sub(self.low.value) <= 1
     }
 
     fn count_standing(&mut self, part: &[i16]) {
@@ -227,5 +234,21 @@ mod tests {
             more(67)
         );
         assert_eq!(check([]), Ok(None));
+    }
+
+    #[test]
+    fn a_signal_of_two_neighbouring_counts_is_flat() {
+        let flat = |samples: &[i16]| {
+            let mut signal = Signal::default();
+            samples.chunks(64).for_each(|part| signal.push(part));
+            signal.is_flat()
+        };
+        for [a, b] in [[0, 1], [7, 8], [-3, -2], [1900, 1901]] {
+            let to_and_fro: Vec<i16> = (0..6600).map(|n| if n % 3 == 0 { a } else { b }).collect();
+            assert!(flat(&to_and_fro), "{a} {b}");
+            let mut one_more = to_and_fro;
+            one_more[4321] = b + 1;
+            assert!(!flat(&one_more), "{a} {b}");
+        }
     }
 }

@@ -254,6 +254,9 @@ impl<'p> Slide<'p> {
         let [still, steady] = &self.signals;
         still.check()?;
         let clipped = steady.check()?;
+        if steady.is_flat() {
+            return Err(SlideError::Silent);
+        }
         let plan = self.plan;
         let (Some(power), Some(spectrum)) = (self.power.mean(plan), self.spectrum.finish()) else {
             return Err(SlideError::TooShort(got));

@@ -11,8 +11,9 @@ use tactus_core::handheld::touch::Touch;
 use tactus_core::handheld::{FEATURES, MOVEMENT};
 use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
+use tactus_core::table::Drift;
 
-use crate::eval::learn::{self, TableError};
+use crate::eval::learn::{Expected, TableError, learn_for, name_finger};
 use crate::sim::collection::{Collection, texture_name};
 use tactus_world::flow::{Ground, HEIGHT_MM};
 use tactus_world::maths::exp;
@@ -240,8 +241,20 @@ pub fn learn(
             Err(_) => left_out.push(texture),
         }
     }
-    let table = learn::learn(Method::Fused, Some(FEATURES), &names, &[MOVEMENT], &known)?;
-    let table = learn::name_finger(&table, FingerCode::of(collection.finger), 0, "")?;
+    let expected = Expected {
+        drift: Some(Drift::BY_HAND),
+        ..Expected::default()
+    };
+    let features = Some(FEATURES);
+    let table = learn_for(
+        &expected,
+        Method::Fused,
+        features,
+        &names,
+        &[MOVEMENT],
+        &known,
+    )?;
+    let table = name_finger(&table, FingerCode::of(collection.finger), 0, "")?;
     Ok((table, left_out))
 }
 
