@@ -23,6 +23,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -155,13 +156,20 @@ def evaluate(*options):
     return json.loads(done.stdout)
 
 
+def known(share):
+    """The cell of the verdicts on known textures."""
+    shares = [f"{share(key):.1f}" for key in ("right", "changed", "new", "wrong", "most_like", "undecided")]
+    if share("most_like"):
+        shares[4] += f" ({share('most_like_right'):.1f} right)"
+    return " / ".join(shares)
+
+
 def told(options, is_open=True):
     """The cells of a row, and the statements behind its reliability."""
     options = [*options, "--runs", RUNS]
     figures = evaluate(*options)
     verdicts, cells = figures["verdicts"], []
-    known = [verdicts[key] for key in ("right", "changed", "new", "wrong", "most_like", "undecided")]
-    cells.append(" / ".join(f"{100 * share:.1f}" for share in known))
+    cells.append(known(lambda key: 100 * verdicts[key]))
     if not is_open:
         return [*cells, *["-"] * 4], figures["reliability"]
     cells.append(f"{100 * evaluate(*options, '--learn')['updates']['wrong']:.1f}")
@@ -186,15 +194,14 @@ def worlds():
     """The simulated worlds' row: means, and the worst share of wrong names among the sure ones."""
     with ThreadPoolExecutor(2) as pool:
         figures = list(pool.map(simulated, WORLDS))
-    mean = lambda key: 100 * np.mean([of["verdicts"][key] for of in figures])
-    known = " / ".join(f"{mean(key):.1f}" for key in ("right", "changed", "new", "wrong", "most_like", "undecided"))
+    cell = known(lambda key: 100 * np.mean([of["verdicts"][key] for of in figures]))
     reliability = [dict(of) for of in figures[0]["reliability"]]
     for other in figures[1:]:
         for of, more in zip(reliability, other["reliability"]):
             said = [(x["said"] or 0) * x["count"] for x in (of, more)]
             of["count"], of["right"] = of["count"] + more["count"], of["right"] + more["right"]
             of["said"] = sum(said) / of["count"] if of["count"] else None
-    return f"| simulated worlds {WORLDS[0]} to {WORLDS[-1]} | interleaved | 5 | {known} | - | - | - | - |", reliability
+    return f"| simulated worlds {WORLDS[0]} to {WORLDS[-1]} | interleaved | 5 | {cell} | - | - | - | - |", reliability
 
 
 def picture(curves):
@@ -237,7 +244,10 @@ def judged(data, wanted, scratch):
         if not folder.is_dir():
             print(f"{folder}: no such folder, left out", file=sys.stderr)
             continue
-        recordings, at = read(folder), folder
+        with warnings.catch_warnings():
+            # slides too short to be one
+            warnings.simplefilter("ignore")
+            recordings, at = read(folder), folder
         if recordings.folder is None:
             recordings.write(at := scratch / name)
         columns = recordings.features()
@@ -255,7 +265,9 @@ def judged(data, wanted, scratch):
             take(name, protocol, train, *told(options, len(recordings.textures) > 3))
         if name == "boreal":
             for parity, of in enumerate(("even", "odd")):
-                boreal(folder, parity, recordings.gain).write(scratch / of)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    boreal(folder, parity, recordings.gain).write(scratch / of)
             options = ["--recordings", scratch / "even", "--test", scratch / "odd", "--protocol", "drift"]
             take(name, "even-odd", 5, *told([*options, "--train-slides", 5]))
     for file in sorted(data.glob("worlds/*.csv")) if not wanted or "worlds" in wanted else []:
@@ -275,9 +287,9 @@ def main(command, data, *wanted):
         book, wanted = pathlib.Path(wanted[1]), wanted[2:]
     with tempfile.TemporaryDirectory() as scratch:
         told_rows, forced_rows, curves = judged(pathlib.Path(data), wanted, pathlib.Path(scratch))
-    known = "known: right / changed / new / wrong / most like / undecided"
+    told_of = "known: right / changed / new / wrong / most like / undecided"
     stop = "after 1 / 2 / 3 slides / at the stop"
-    head = f"| set | split | learned | {known} | wrong updates | new: noticed {stop} | sure of a wrong name | its own figure |"
+    head = f"| set | split | learned | {told_of} | wrong updates | new: noticed {stop} | sure of a wrong name | its own figure |"
     tables = [head, "|---|---|---|---|---|---|---|---|", *told_rows, ""]
     tables.append("| set | split | learned | textures | " + " | ".join([*OURS, *PEERS]) + " |")
     tables.extend(["|---|---|---|---|" + "---|" * (len(OURS) + len(PEERS)), *forced_rows])

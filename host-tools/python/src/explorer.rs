@@ -230,9 +230,9 @@ impl Explorer {
         self.inner().core.slides()
     }
 
-    /// The answer as soon as there is one, else None: a dict with told ("sure", "most-like", "changed", "new" or "undecided"),
-    /// texture (the most probable one), probability, log_odds (that it is none of those known; None where that cannot
-    /// be told) and slides.
+    /// The answer as soon as there is one, else None: a dict with told ("sure", "most-like", "changed", "new" or
+    /// "undecided"), texture (the most probable one), probability, log_odds (that it is none of those known; None where
+    /// that cannot be told) and slides.
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let inner = self.inner();
         let verdict = inner.core.verdict();

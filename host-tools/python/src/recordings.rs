@@ -293,8 +293,8 @@ impl Recordings {
     /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it cannot be measured),
     /// roughness_ln, fineness_unfiltered_ln (float32), roughness_is_bound (bool), each of shape (slides,); ln_psd_bands
     /// of shape (slides, 8) and ln_fused_bands of shape (slides, 26), float32; pdc of shape (slides, 2), mean and
-    /// standard deviation of P_DC (about the parabola that fits best), NaN where it was not measured; session and run (str). See `Features` for units.
-    /// Slides are read and measured once, on all cores.
+    /// standard deviation of P_DC (about the parabola that fits best), NaN where it was not measured; session and run
+    /// (str). See `Features` for units. Slides are read and measured once, on all cores.
     ///
     /// Raises RecordingError where a file cannot be read, or a slide has no features; KeyboardInterrupt after Ctrl-C.
     fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

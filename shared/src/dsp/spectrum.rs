@@ -391,9 +391,9 @@ impl Spectrum {
         &self.psd
     }
 
-    /// Mean over frames of the natural logarithm of the power in each band of [`FUSED_EDGES`], counts^2 per bin, the mean
-    /// of each frame removed and 0.1 added: a burst in one frame weighs no more than its frame, silence has a value, and
-    /// what is far below a count has hardly any.
+    /// Mean over frames of the natural logarithm of the power in each band of [`FUSED_EDGES`], counts^2 per bin, the
+    /// mean of each frame removed and 0.1 added: a burst in one frame weighs no more than its frame, silence has a
+    /// value, and what is far below a count has hardly any.
     pub fn fused_bands(&self) -> &[f32; FUSED_BANDS] {
         &self.fused_bands
     }

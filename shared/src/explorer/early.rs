@@ -1,5 +1,5 @@
-//! The decision to end a slide before its end: the posterior after what it has said so far, by a table that knows slides
-//! of that length.
+//! The decision to end a slide before its end: the posterior after what it has said so far, by a table that knows
+//! slides of that length.
 //!
 //! A probability that is read again and again while a slide goes on is above a threshold more often by chance than one
 //! that is read once. So it is read at a few lengths only, and has to be more certain than at the end of a slide.

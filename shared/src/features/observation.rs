@@ -30,8 +30,8 @@ pub type Vector = Vec<i16, MAX_FEATURES>;
 pub enum FeatureSet {
     /// Traction in N, and logarithms of band powers.
     Force,
-    /// Mean of P_DC during the slide in units of 100 counts, the logarithm of its scatter, and logarithms of band powers:
-    /// for a rig without force sensing.
+    /// Mean of P_DC during the slide in units of 100 counts, the logarithm of its scatter, and logarithms of band
+    /// powers: for a rig without force sensing.
     Pressure,
     /// Logarithms of band powers only.
     Bands,
@@ -89,8 +89,8 @@ pub struct Observation {
     /// Mean natural logarithms of the band powers, in steps of 1/1024: of [`FUSED_EDGES`](crate::dsp::FUSED_EDGES), or
     /// the coarse ones where no more than [`COARSE_BANDS`] of these were measured.
     pub bands: Vec<i16, FUSED_BANDS>,
-    /// Mean of P_DC in steps of 1/1024 of 100 counts, and natural logarithm of its standard deviation about a parabola and
-    /// half a count, in steps of 1/1024.
+    /// Mean of P_DC in steps of 1/1024 of 100 counts, and natural logarithm of its standard deviation about a parabola
+    /// and half a count, in steps of 1/1024.
     pub pressure: Option<[i16; 2]>,
     /// Natural logarithm of the mean speed in parts of the movement's, in steps of 1/1024; `None` where it was not
     /// measured.

@@ -100,8 +100,8 @@ impl Signal {
         fours.iter().any(any) || rest.iter().any(is_out)
     }
 
-    /// True if all samples are of two neighbouring counts: a dead converter may go to and fro between them, and a sliding
-    /// finger's signal has noise of more than one.
+    /// True if all samples are of two neighbouring counts: a dead converter may go to and fro between them, and a
+    /// sliding finger's signal has noise of more than one.
     pub fn is_flat(&self) -> bool {
         self.high.value.saturating_sub(self.low.value) <= 1
     }

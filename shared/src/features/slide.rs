@@ -339,8 +339,8 @@ pub struct Measurement {
     pub roughness_is_bound: bool,
     /// [`SlideError::Clipped`] where that is to be told, though the slide counts: see [`Signal::check`].
     pub clipped: Option<SlideError>,
-    /// Mean of P_DC during the slide in counts about the lifted finger's, and standard deviation about the parabola that
-    /// fits best; `None` if it was not given.
+    /// Mean of P_DC during the slide in counts about the lifted finger's, and standard deviation about the parabola
+    /// that fits best; `None` if it was not given.
     pub pdc: Option<(f32, f32)>,
     /// See [`Observation::pace`](super::observation::Observation::pace).
     pub pace: Option<i16>,

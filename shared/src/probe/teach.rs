@@ -58,8 +58,8 @@ pub async fn put_in_force<F: NorFlash>(
 
 /// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`; `base`
 /// is the stored table, which a person taught. Returns the event to send; `None` where there is nothing to learn.
-/// Errors: the table names too many new textures, the texture has walked too far, or many have walked together ([`walk`]), or the store failed; the table in
-/// force is as it was.
+/// Errors: the table names too many new textures, the texture has walked too far, or many have walked together
+/// ([`walk`]), or the store failed; the table in force is as it was.
 pub(crate) async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
     base: &Table<'_>,

@@ -34,7 +34,8 @@ pub(super) const KEY_TRAINED: u8 = 16;
 /// The first of the textures that the probe learned by itself, one each.
 pub(super) const KEY_SELF: u8 = 64;
 pub(super) const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;
-/// The longest record with its key, in whole words: one of training takes 99 bytes, a self-learned one 106; with fine bands, 141 and 190.
+/// The longest record with its key, in whole words: one of training takes 99 bytes, a self-learned one 106; with fine
+/// bands, 141 and 190.
 pub(super) const RECORD: usize = 192;
 
 /// How far the training of a texture at one movement has come.

@@ -48,8 +48,8 @@ impl Drift {
         traction: 0.0,
     };
 
-    /// A table made by hand: how a hand's slides scatter is in its whitening, and the drift of a rig's session on top of
-    /// that would hide what tells textures apart.
+    /// A table made by hand: how a hand's slides scatter is in its whitening, and the drift of a rig's session on top
+    /// of that would hide what tells textures apart.
     pub const BY_HAND: Self = Self {
         bands: 0.05,
         traction: 0.02,

@@ -53,8 +53,8 @@ pub(crate) struct Args {
     /// early then. The image tactus-rig takes such a table, the others refuse it
     #[arg(long, value_name = "S,S,...", value_delimiter = ',', value_parser = length)]
     lengths: Vec<u16>,
-    /// Leave out what only a PC needs, the note of the slides, and how the table does with new textures: a shorter table,
-    /// which tells names without asking whether a new texture would get them
+    /// Leave out what only a PC needs, the note of the slides, and how the table does with new textures: a shorter
+    /// table, which tells names without asking whether a new texture would get them
     #[arg(long)]
     plain: bool,
     /// The file to write; "-": standard output

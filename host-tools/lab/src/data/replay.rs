@@ -93,8 +93,8 @@ impl MeasuredSlide {
     }
 }
 
-/// Fewest frames of a slide that give it fine bands: 1.5 s. With six frames, and five slides of a class, they doubled the
-/// wrong names of a robot's terrains.
+/// Fewest frames of a slide that give it fine bands: 1.5 s. With six frames, and five slides of a class, they doubled
+/// the wrong names of a robot's terrains.
 const FRAMES_FOR_FINE: u32 = 12;
 
 /// The features of a whole slide: with coarse bands where the frames are few, for then fine ones scatter too much.

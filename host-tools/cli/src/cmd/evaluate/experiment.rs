@@ -82,7 +82,8 @@ pub(crate) struct Args {
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
     #[arg(long, conflicts_with = "novelty")]
     pub(crate) verify: bool,
-    /// It is one of the textures known, and the explorer knows it: nothing is told to be new, and names are told as sure
+    /// It is one of the textures known, and the explorer knows it: nothing is told to be new, and names are told as
+    /// sure
     #[arg(long, conflicts_with_all = ["novelty", "verify"])]
     pub(crate) closed: bool,
     /// As with `identify --learn`: two slides at least; count how often the probe would learn by itself, and wrongly
