@@ -43,6 +43,7 @@ PEERS = {
 }
 OURS = {"ours": (0.12, 0.04), "ours, no drift expected": (0.0, 0.0)}
 TACTUS, RUNS = "tactus", 2000
+MARKS = r"(<!-- evidence: [^\n]*-->\n).*?(\n<!-- /evidence -->)"
 WORLDS, TEXTURES = range(1, 21), ",".join(map(str, range(3, 109, 5)))
 
 
@@ -285,6 +286,8 @@ def main(command, data, *wanted):
     TACTUS, book = command, None
     if wanted[:1] == ("--write",):
         book, wanted = pathlib.Path(wanted[1]), wanted[2:]
+    if book and not re.search(MARKS, (book / "evidence.md").read_text(), re.S):
+        sys.exit(f"{book / 'evidence.md'}: no marks of the tables")
     with tempfile.TemporaryDirectory() as scratch:
         told_rows, forced_rows, curves = judged(pathlib.Path(data), wanted, pathlib.Path(scratch))
     told_of = "known: right / changed / new / wrong / most like / undecided"
@@ -295,11 +298,8 @@ def main(command, data, *wanted):
     tables.extend(["|---|---|---|---|" + "---|" * (len(OURS) + len(PEERS)), *forced_rows])
     if book is None:
         return print("\n".join(tables))
-    page = (book / "evidence.md").read_text()
-    marks = r"(<!-- evidence: .*? -->\n\n).*?(\n\n<!-- /evidence -->)"
-    page, made = re.subn(marks, lambda found: found[1] + "\n".join(tables) + found[2], page, flags=re.S)
-    if made != 1:
-        sys.exit(f"{book / 'evidence.md'}: no marks of the tables")
+    write = lambda found: found[1] + "\n".join(["", *tables, ""]) + found[2]
+    page = re.sub(MARKS, write, (book / "evidence.md").read_text(), flags=re.S)
     (book / "evidence.md").write_text(page)
     (book / "reliability.svg").write_text(picture(curves))
 
