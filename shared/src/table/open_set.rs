@@ -8,6 +8,8 @@ use super::view::Table;
 /// Share of new textures up to which a name may be told as sure: with a table that is sure of a wrong name for more,
 /// a texture is "most like" the named one.
 pub const MOST_NAMED: f32 = 0.1;
+/// Where the share is greater, no more may be possible: a half.
+const MOST_POSSIBLE: f32 = 0.5;
 
 /// A share, and where it lies with a probability of 95 %.
 #[derive(Clone, Copy, PartialEq, Debug, Default, serde::Serialize)]
@@ -41,10 +43,11 @@ impl OpenSet {
         self.new_named.share <= MOST_NAMED
     }
 
-    /// Returns whether a name may be told as sure: it is not certain that too many new textures get one. The share of a
-    /// few textures says little by itself: of twenty, four may be chance.
+    /// Returns whether a name may be told as sure: too few new textures get one, or it is not certain that too many do,
+    /// and textures are enough to say that most do not. Of twenty, four may be chance; of five, one says nothing.
     pub fn may_name(&self) -> bool {
-        self.new_named.low <= MOST_NAMED
+        let Share { share, low, high } = self.new_named;
+        share <= MOST_NAMED || low <= MOST_NAMED && high <= MOST_POSSIBLE
     }
 
     fn shares(&self) -> [Share; 3] {

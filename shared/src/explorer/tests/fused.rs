@@ -648,12 +648,8 @@ fn what_may_be_unknown_is_not_sure() {
 #[test]
 fn a_name_that_new_textures_too_often_get_is_not_told_as_sure() {
     let plain = axes();
-    let with_named = |low| {
-        let new_named = Share {
-            share: 0.5,
-            low,
-            high: 1.0,
-        };
+    let with_named = |[share, low, high]: [f32; 3]| {
+        let new_named = Share { share, low, high };
         let figures = OpenSet {
             new_named,
             ..OpenSet::default()
@@ -663,9 +659,11 @@ fn a_name_that_new_textures_too_often_get_is_not_told_as_sure() {
         table.unwrap().as_bytes().to_vec()
     };
     for (named, config, kind) in [
-        (0.1, OPEN, VerdictKind::Sure),
-        (0.11, OPEN, VerdictKind::MostLike),
-        (0.11, CLOSED, VerdictKind::Sure),
+        ([0.1, 0.0, 1.0], OPEN, VerdictKind::Sure),
+        ([0.2, 0.1, 0.5], OPEN, VerdictKind::Sure),
+        ([0.2, 0.1, 0.51], OPEN, VerdictKind::MostLike),
+        ([0.2, 0.11, 0.4], OPEN, VerdictKind::MostLike),
+        ([0.2, 0.11, 0.4], CLOSED, VerdictKind::Sure),
     ] {
         let bytes = with_named(named);
         let mut explorer = fused(&bytes, config);
