@@ -368,7 +368,10 @@ fn a_robots_terrains_are_imported_and_evaluated_as_the_page_says() {
     // a minute of each run at most is in the extract: of asphalt there is too little, which is said
     assert_says(&told["notes"].to_string(), &["too few slides: ASPHALT"]);
     assert_eq!(told["textures"], 4, "{told}");
-    assert!(share("right") > 0.5 && share("wrong") < 0.12, "{told}");
+    // four terrains do not show that a fifth one is noticed: names are not told as sure
+    let wrong = share("most_like") - share("most_like_right");
+    assert!(share("right") + share("wrong") == 0.0, "{told}");
+    assert!(share("most_like_right") > 0.5 && wrong < 0.12, "{told}");
 }
 
 /// One recording that was cut into two files is one slide, whatever the rate, and whatever the second is called.
