@@ -66,6 +66,17 @@ pub(crate) fn straight(features: usize) -> Whitening {
     Whitening::read(&bytes, features).unwrap()
 }
 
+/// A fused table with this share of new textures that get a name, and its interval, as its own figure.
+pub(crate) fn naming_new(plain: &[u8], [share, low, high]: [f32; 3]) -> Vec<u8> {
+    let figures = OpenSet {
+        new_named: Share { share, low, high },
+        ..OpenSet::default()
+    };
+    let mut out = vec![0; plain.len() + OpenSet::LENGTH];
+    let table = with_open_set(&mut out, &Table::read(plain).unwrap(), &figures);
+    table.unwrap().as_bytes().to_vec()
+}
+
 /// A fused table of what is known of each texture, movement by movement, on the study's grid of movements.
 pub(crate) fn fused_of(
     set: FeatureSet,

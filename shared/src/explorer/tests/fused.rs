@@ -3,8 +3,8 @@
 use super::*;
 use crate::explorer::VerdictKind;
 use crate::table::tests::whitening::{Noise, World, learned};
-use crate::table::tests::{fused_of, known, straight};
-use crate::table::{OpenSet, Share, Whitened, Whitening, with_open_set};
+use crate::table::tests::{fused_of, known, naming_new, straight};
+use crate::table::{Whitened, Whitening};
 use std::string::ToString;
 
 /// Steps 4, 6 and 7 of the recipe on the means that the table holds.
@@ -648,16 +648,6 @@ fn what_may_be_unknown_is_not_sure() {
 #[test]
 fn a_name_that_new_textures_too_often_get_is_not_told_as_sure() {
     let plain = axes();
-    let with_named = |[share, low, high]: [f32; 3]| {
-        let new_named = Share { share, low, high };
-        let figures = OpenSet {
-            new_named,
-            ..OpenSet::default()
-        };
-        let mut out = vec![0; plain.len() + OpenSet::LENGTH];
-        let table = with_open_set(&mut out, &Table::read(&plain).unwrap(), &figures);
-        table.unwrap().as_bytes().to_vec()
-    };
     for (named, config, kind) in [
         ([0.1, 0.0, 1.0], OPEN, VerdictKind::Sure),
         ([0.2, 0.1, 0.5], OPEN, VerdictKind::Sure),
@@ -665,7 +655,7 @@ fn a_name_that_new_textures_too_often_get_is_not_told_as_sure() {
         ([0.2, 0.11, 0.4], OPEN, VerdictKind::MostLike),
         ([0.2, 0.11, 0.4], CLOSED, VerdictKind::Sure),
     ] {
-        let bytes = with_named(named);
+        let bytes = naming_new(&plain, named);
         let mut explorer = fused(&bytes, config);
         explorer.observe(look(0), &at(&[6.0, 0.0, 0.0])).unwrap();
         let verdict = explorer.verdict().unwrap();
@@ -739,21 +729,8 @@ fn it_learns_from_two_slides_that_agree() {
         "it need not make another"
     );
     // nor where the table would name too many new textures
-    let new_named = Share {
-        share: 0.11,
-        low: 0.0,
-        high: 1.0,
-    };
-    let figures = OpenSet {
-        new_named,
-        ..OpenSet::default()
-    };
-    let mut out = vec![0; bytes.len() + OpenSet::LENGTH];
-    let table = with_open_set(&mut out, &Table::read(&bytes).unwrap(), &figures);
-    assert_eq!(
-        after_of(table.unwrap().as_bytes(), &[own, own], learn),
-        (false, true)
-    );
+    let named = naming_new(&bytes, [0.11, 0.0, 1.0]);
+    assert_eq!(after_of(&named, &[own, own], learn), (false, true));
     // both together are certain, and each by itself is most like another one, before or behind
     let (other, rest) = ([2.6, 3.4, 0.0], [9.4, -3.4, 0.0]);
     for slides in [[other, rest], [rest, other]] {

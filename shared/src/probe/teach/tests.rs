@@ -4,10 +4,9 @@ use super::*;
 use crate::features::{FeatureSet, MAX_FEATURES};
 use crate::store::tests::ram::{Ram, Torn};
 use crate::store::{FlashFault, StoreError, TrainingRecord};
-use crate::table::tests::{fused_of, known, straight};
+use crate::table::tests::{fused_of, known, naming_new, straight};
 use crate::table::{
-    Drift, EPISODES, Limits, OpenSet, PAIRS, Population, Sections, Share, Tail, TrainingStats,
-    with_open_set, with_sections,
+    Drift, EPISODES, Limits, PAIRS, Population, Sections, Tail, TrainingStats, with_sections,
 };
 use embassy_futures::block_on;
 use std::string::ToString;
@@ -299,18 +298,7 @@ fn a_mean_walks_as_far_as_the_drift_and_no_farther() {
 fn a_table_that_would_name_new_textures_learns_nothing_by_itself() {
     let plain = base();
     for (share, may) in [(0.1, true), (0.11, false)] {
-        let new_named = Share {
-            share,
-            low: 0.0,
-            high: 1.0,
-        };
-        let figures = OpenSet {
-            new_named,
-            ..OpenSet::default()
-        };
-        let mut out = vec![0; plain.len() + OpenSet::LENGTH];
-        let bytes = with_open_set(&mut out, &Table::read(&plain).unwrap(), &figures);
-        let bytes = bytes.unwrap().as_bytes().to_vec();
+        let bytes = naming_new(&plain, [share, 0.0, 1.0]);
         let old = Table::read(&bytes).unwrap();
         let (mut store, mut force) = (store(&bytes), buffer(&bytes));
         let episode = summary(&force, 2, &[(1, 2, [100, 1400, -300])]);
