@@ -78,4 +78,5 @@ def command():
         done = subprocess.run([name, *map(str, arguments)], capture_output=True, text=True)
         return done.stdout if done.returncode in (0, 3) else done.stderr.strip().removeprefix("error: ")
 
+    run.file = name
     return run

@@ -36,22 +36,33 @@ def test_a_confusion_matrix(tmp_path):
     assert float(said.split(" % right")[0].split()[-1]) >= 90
 
 
-def test_ours_beside_scikit_learn(tmp_path):
-    """The script behind the book's table, with made-up recordings in the place of real ones."""
+def test_evidence_of_a_set_is_written_into_the_book(command, tmp_path):
+    """The script behind the book's tables, with made-up recordings in the place of real ones."""
     sklearn()
     arrays, labels = sensor(2200, each=8)
     made = tactus.Recordings.from_arrays(arrays, rate_hz=2200, labels=labels, sessions=["a", "b"] * 12)
     made.write(tmp_path / "biotac")
-    run = [sys.executable, str(ROOT / "docs/peers.py"), str(tmp_path), "biotac"]
+    page = tmp_path / "evidence.md"
+    run = [sys.executable, ROOT / "docs/evidence.py", command.file, tmp_path, "--write", tmp_path, "biotac"]
+    page.write_text("before\n")
     done = subprocess.run(run, capture_output=True, text=True)
-    head, _, *rows = done.stdout.splitlines()
-    assert done.returncode == 0 and rows, done.stderr
-    methods = [cell.strip() for cell in head.split("|")[5:-1]]
-    assert methods == ["ours", "ours, no drift expected", "LDA", "SVM", "random forest"]
-    shares = [[float(cell.strip(" *")) for cell in row.split("|")[5:-1]] for row in rows]
+    assert done.returncode == 1 and "no marks" in done.stderr and page.read_text() == "before\n"
+    page.write_text("before\n\n<!-- evidence: made -->\nold\n<!-- /evidence -->\n\nbehind\n")
+    done = subprocess.run(run, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    text = page.read_text()
+    assert text.startswith("before\n") and text.endswith("\nbehind\n") and "old" not in text
+    told, forced = ([row.split("|")[1:-1] for row in part.splitlines()[2:]] for part in text.split("\n\n")[2:4])
+    splits = ["interleaved", "blocked", "drift", "sessions"]
+    assert [row[1].strip() for row in told] == [row[1].strip() for row in forced] == splits
     # noises of so different frequencies are told apart by all, but for a draw of a class that is left out
-    assert [row.split("|")[2].strip() for row in rows] == ["interleaved", "blocked", "drift", "sessions"]
-    assert all(80 <= share <= 100 for row in shares for share in row)
+    assert all(80 <= float(cell.strip(" *")) <= 100 for row in forced for cell in row[4:])
+    for row in told:
+        right, _, *others = map(float, row[3].split("/"))
+        assert abs(right + sum(others) - 100) < 0.3 and right > 50
+    methods = [cell.strip() for cell in text.split("\n\n")[3].splitlines()[0].split("|")[5:-1]]
+    assert methods == ["ours", "ours, no drift expected", "LDA", "SVM", "random forest"]
+    assert "biotac, drift, 5" in (tmp_path / "reliability.svg").read_text()
 
 
 def test_a_simulated_rig_that_explores(tmp_path):
