@@ -65,7 +65,7 @@ enum Cli {
     /// Judge every data set that is there, with the defaults: the tables of the book's page of evidence
     ///
     /// What is told of known and of new textures, and one slide's forced name beside scikit-learn's classifiers, split
-    /// by split; a quarter of an hour on two cores. It needs Python and the data sets, see DATA.md.
+    /// by split; ten minutes on two cores. It needs Python and the data sets, see DATA.md.
     Evidence(python::Evidence),
     /// Count what the core's kernels cost on the chip
     ///
