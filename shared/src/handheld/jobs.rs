@@ -110,7 +110,7 @@ pub fn words(why: &MemoryError) -> &'static str {
             "The textures do not allow that."
         }
         // only a host asks it to learn by itself
-        MemoryError::Walked(_) | MemoryError::Together | MemoryError::NamesNew => {
+        MemoryError::TooFar(_) | MemoryError::CommonShift | MemoryError::NamesNew => {
             "It may have changed. Teach it."
         }
         MemoryError::Store(StoreError::Worn) => "The memory is worn out and keeps nothing new.",

@@ -58,8 +58,8 @@ pub async fn put_in_force<F: NorFlash>(
 
 /// Learns from an episode that the probe was certain of, into the store and into the table in force in `buffer`; `base`
 /// is the stored table, which a person taught. Returns the event to send; `None` where there is nothing to learn.
-/// Errors: the table names too many new textures, the texture has walked too far, or many have walked together
-/// ([`walk`]), or the store failed; the table in force is as it was.
+/// Errors: the table names too many new textures, the texture has shifted too far, or many have shifted the same way
+/// ([`shift`]), or the store failed; the table in force is as it was.
 pub(crate) async fn learn_by_itself<F: NorFlash>(
     episode: &EpisodeSummary,
     base: &Table<'_>,
@@ -99,19 +99,22 @@ pub(crate) async fn learn_by_itself<F: NorFlash>(
         return Ok(None);
     }
     let name = name_of(table.name(texture).unwrap_or_default());
-    if walk::is_too_far(base, texture, &record) {
-        return Err(MemoryError::Walked(name));
+    if shift::is_too_far(base, texture, &record) {
+        return Err(MemoryError::TooFar(name));
     }
-    let mut together = walk::Together::default();
-    together.take(base, &record);
-    let mut each = |kept: SelfLearnedRecord| {
-        if kept.number != number {
-            together.take(base, &kept);
+    // all that this episode made, one movement after the other
+    for (movement, ..) in &record.movements {
+        let mut common = shift::CommonShift::at(*movement);
+        common.take(base, &record);
+        let mut each = |kept: SelfLearnedRecord| {
+            if kept.number != number {
+                common.take(base, &kept);
+            }
+        };
+        store.self_learned(lineage, &mut each).await?;
+        if common.is_no_chance() {
+            return Err(MemoryError::CommonShift);
         }
-    };
-    store.self_learned(lineage, &mut each).await?;
-    if together.is_so() {
-        return Err(MemoryError::Together);
     }
     let before = table.tally(texture);
     let tally = Tally {
@@ -316,6 +319,6 @@ fn name_of(name: &str) -> Name {
     Name::try_from(name).unwrap_or_default()
 }
 
+mod shift;
 #[cfg(test)]
 mod tests;
-mod walk;

@@ -110,12 +110,12 @@ pub enum MemoryError {
         "{0} has moved as far from what was taught as it may by itself: if it is {0}, say so with \
          `tactus device teach`, or undo with `tactus device forget --self-learned`"
     )]
-    Walked(Name),
+    TooFar(Name),
     #[error(
         "all textures that it learned by itself have moved the same way, so finger, rig or drive has changed: nothing \
          is learned until `tactus device refresh`"
     )]
-    Together,
+    CommonShift,
     #[error(
         "by its own figures this table would give too many new textures a name, and learn them under it: nothing is \
          learned by itself. `tactus device table show` has the figures; more slides of each texture may help"

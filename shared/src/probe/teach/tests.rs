@@ -267,7 +267,7 @@ fn nothing_is_learned_that_is_not_certain() {
 }
 
 #[test]
-fn a_mean_walks_as_far_as_the_drift_and_no_farther() {
+fn a_mean_shifts_as_far_as_the_drift_and_no_farther() {
     // of variance 0.5 in 3 axes, and 1/7 + 1/5 of the slides: 3 + 4 sqrt(6) = 12.8 = 3.9^2 of 0.843
     for (bytes, most) in [(base(), 2.1), (calibrated(), 3.28)] {
         let old = Table::read(&bytes).unwrap();
@@ -288,7 +288,7 @@ fn a_mean_walks_as_far_as_the_drift_and_no_farther() {
             }
             match goes {
                 true => assert_eq!(told, Ok(Some(learned_event("t0", 2, true))), "{off}"),
-                false => assert_eq!(told, Err(MemoryError::Walked(name_of("t0"))), "{off}"),
+                false => assert_eq!(told, Err(MemoryError::TooFar(name_of("t0"))), "{off}"),
             }
         }
     }
@@ -312,18 +312,19 @@ fn a_table_that_would_name_new_textures_learns_nothing_by_itself() {
 }
 
 #[test]
-fn textures_that_walk_together_stop_it_until_the_table_is_another() {
+fn textures_that_shift_the_same_way_stop_it_until_the_table_is_another() {
     let bytes = calibrated();
     let old = Table::read(&bytes).unwrap();
-    let learned = |ways: [[f64; 3]; 4]| {
+    let learned = |shifts: [[f64; 3]; 4], movements: [u8; 4]| {
         let mut store = store(&bytes);
         let mut force = buffer(&bytes);
-        let each = ways.iter().zip(0u16..).map(|(way, texture)| {
-            let mean = old.whitened(texture, 0).mean;
-            let at = [0, 1, 2].map(|axis| mean[axis] + (way[axis] * 256.0) as i16);
+        let each = shifts.iter().zip(movements).zip(0u16..);
+        let each = each.map(|((shift, movement), texture)| {
+            let mean = old.whitened(texture, movement).mean;
+            let at = [0, 1, 2].map(|axis| mean[axis] + (shift[axis] * 256.0) as i16);
             let mut told = Ok(None);
             for _ in 0..10 {
-                let episode = summary(&force, texture, &[(0, 2, at)]);
+                let episode = summary(&force, texture, &[(movement, 2, at)]);
                 told = block_on(learn_by_itself(&episode, &old, &mut store, &mut force));
             }
             told.is_ok()
@@ -331,9 +332,11 @@ fn textures_that_walk_together_stop_it_until_the_table_is_another() {
         each.collect::<List<bool>>()
     };
     // each goes as far, and none too far; but not the same way
-    let (way, back) = ([1.6, 1.0, 0.8], [-1.6, -1.0, -0.8]);
-    assert_eq!(learned([way, back, way, back]), [true; 4]);
-    assert_eq!(learned([way; 4]), [true, true, true, false]);
+    let (to, back) = ([1.6, 1.0, 0.8], [-1.6, -1.0, -0.8]);
+    assert_eq!(learned([to, back, to, back], [0; 4]), [true; 4]);
+    assert_eq!(learned([to; 4], [0; 4]), [true, true, true, false]);
+    // the axes of other movements are others
+    assert_eq!(learned([to; 4], [0, 0, 0, 1]), [true; 4]);
 }
 
 #[test]
