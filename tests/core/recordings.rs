@@ -26,7 +26,7 @@ fn all_slides_of_the_real_recordings_are_read() {
             assert_eq!(slide.texture, index);
             assert_eq!((slide.pac().len(), slide.pdc.len()), (12_980, 590));
             assert_eq!(slide.shear_mn().map(|s| s.len()), Some(590));
-            assert_eq!((slide.pdc_rate_hz, slide.shear_rate_hz), (100, 100));
+            assert_eq!((slide.pdc_rate_hz, slide.shear_rate_hz), (100.0, 100.0));
             assert_eq!(slide.steady(2200), 1100..12_100);
             assert_eq!(slide.steady(100), 50..550);
             assert_eq!(slide.background, Some(2.2));

@@ -437,7 +437,7 @@ impl Slide {
 
     /// Rate of `pdc`, Hz.
     #[getter]
-    fn pdc_rate_hz(&self) -> u32 {
+    fn pdc_rate_hz(&self) -> f64 {
         self.recording.pdc_rate_hz
     }
 
@@ -449,7 +449,7 @@ impl Slide {
 
     /// Rate of `shear_mn`, Hz.
     #[getter]
-    fn shear_rate_hz(&self) -> u32 {
+    fn shear_rate_hz(&self) -> f64 {
         self.recording.shear_rate_hz
     }
 

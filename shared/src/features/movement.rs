@@ -69,18 +69,47 @@ impl Movement {
         speed_um_s: 0,
     };
 
-    /// Returns whether force and speed are known.
+    /// Returns whether force and speed are both known.
     pub fn is_known(self) -> bool {
-        self != Self::UNKNOWN
+        self.force_mn != 0 && self.speed_um_s != 0
     }
 
-    /// As [`Movement::new`], or [`Movement::UNKNOWN`] from two zeros: as tables and recordings have it.
+    /// As [`Movement::new`], where 0 says that a value is unknown: as tables and recordings have it.
     /// Errors: the first value that is out of its range.
     pub const fn stored(force_mn: u16, speed_um_s: u32) -> Result<Self, MovementError> {
-        match (force_mn, speed_um_s) {
-            (0, 0) => Ok(Self::UNKNOWN),
-            _ => Self::new(force_mn, speed_um_s),
+        // what is unknown is in every range
+        let any = Self::FOR_FINENESS;
+        let force = if force_mn == 0 {
+            any.force_mn
+        } else {
+            force_mn
+        };
+        let speed = if speed_um_s == 0 {
+            any.speed_um_s
+        } else {
+            speed_um_s
+        };
+        match Self::new(force, speed) {
+            Ok(_) => Ok(Self {
+                force_mn,
+                speed_um_s,
+            }),
+            Err(why) => Err(why),
         }
+    }
+
+    /// As [`Movement::from_si`], of values that may be unknown.
+    /// Errors: the first value that is known, and out of its range.
+    pub fn partly(force_n: Option<f32>, speed_mm_s: Option<f32>) -> Result<Self, MovementError> {
+        let any = Self::FOR_FINENESS;
+        let all = Self::from_si(
+            force_n.unwrap_or(any.force_n()),
+            speed_mm_s.unwrap_or(any.speed_mm_s()),
+        )?;
+        Ok(Self {
+            force_mn: force_n.map_or(0, |_| all.force_mn),
+            speed_um_s: speed_mm_s.map_or(0, |_| all.speed_um_s),
+        })
     }
 
     /// A movement of `force_mn` millinewtons and `speed_um_s` micrometres per second.
@@ -172,21 +201,23 @@ impl Movement {
 
 impl fmt::Display for Movement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.is_known() {
+        if *self == Self::UNKNOWN {
             return f.write_str("unknown");
         }
         // as core prints an f32, to the nearest and then the even one: with core that takes the chip 9 KB
         let nearest = |value: f32, parts: f64| libm::rint(f64::from(value) * parts) as u32;
         let hundredths_n = nearest(self.force_n(), 100.0);
         let tenths_mm_s = nearest(self.speed_mm_s(), 10.0);
-        write!(
-            f,
-            "{}.{:02} N, {}.{} mm/s",
-            hundredths_n / 100,
-            hundredths_n % 100,
-            tenths_mm_s / 10,
-            tenths_mm_s % 10
-        )
+        if self.force_mn != 0 {
+            write!(f, "{}.{:02} N", hundredths_n / 100, hundredths_n % 100)?;
+        }
+        if self.is_known() {
+            f.write_str(", ")?;
+        }
+        if self.speed_um_s != 0 {
+            write!(f, "{}.{} mm/s", tenths_mm_s / 10, tenths_mm_s % 10)?;
+        }
+        Ok(())
     }
 }
 
@@ -236,6 +267,27 @@ mod tests {
         assert!(Movement::from_si(1.262, 63.096).unwrap().is_high_wear());
         // a = i + k <= 6: 5 + 4 + 3 + 2 + 1 cells
         assert_eq!(Movement::grid().filter(|m| !m.is_high_wear()).count(), 15);
+    }
+
+    #[test]
+    fn either_value_may_be_unknown() {
+        use std::string::ToString as _;
+        for (force_n, speed_mm_s, stored, text) in [
+            (None, None, (0, 0), "unknown"),
+            (Some(0.5), None, (500, 0), "0.50 N"),
+            (None, Some(25.0), (0, 25_000), "25.0 mm/s"),
+            (Some(0.5), Some(25.0), (500, 25_000), "0.50 N, 25.0 mm/s"),
+        ] {
+            let movement = Movement::partly(force_n, speed_mm_s).unwrap();
+            assert_eq!(Movement::stored(stored.0, stored.1), Ok(movement));
+            assert_eq!(movement.to_string(), text);
+            assert_eq!(movement.is_known(), stored.0 != 0 && stored.1 != 0);
+        }
+        assert_eq!(Movement::stored(9, 0), Err(MovementError::Force(9)));
+        assert_eq!(Movement::stored(0, 9), Err(MovementError::Speed(9)));
+        // a value that is there is a value: 0 N is none
+        let none = Movement::partly(Some(0.0), None);
+        assert_eq!(none, Err(MovementError::Force(0)));
     }
 
     #[test]

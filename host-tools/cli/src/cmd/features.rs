@@ -68,7 +68,7 @@ impl<'s> SlideFeatures<'s> {
     fn of(texture: &'s Texture, slide: &MeasuredSlide, trial: usize, key: &'s SlideKey) -> Self {
         let measurement = &slide.measurement;
         let value = |property| measurement.properties.get(property);
-        let known = |value: f32| slide.movement.is_known().then_some(value);
+        let known = |value: f32| (value > 0.0).then_some(value);
         let bands = measurement.spectrum.fused_bands();
         let (pdc_mean, pdc_sd) = measurement.pdc.unzip();
         Self {
@@ -238,8 +238,9 @@ fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> std::io::Resul
         .flat_map(|(_, slide, _)| slide.number.to_le_bytes())
         .collect();
     let movement = |of: fn(Movement) -> f32| {
-        let known = |m: Movement| if m.is_known() { of(m) } else { f32::NAN };
-        floats(rows().map(|(_, s, _)| known(s.movement)).collect(), &[all])
+        let known = |value: f32| if value > 0.0 { value } else { f32::NAN };
+        let values = rows().map(|(_, slide, _)| known(of(slide.movement)));
+        floats(values.collect(), &[all])
     };
     let words = |of: fn(&SlideKey) -> &str| npy::words(rows().map(|(_, _, key)| of(key)));
     npy::zipped(&[

@@ -336,10 +336,10 @@ impl SlideFiles {
             blocks: Vec::new(),
             background: Some(BACKGROUND_POWER),
             pdc: self.bio.pdc,
-            pdc_rate_hz: ROW_RATE_HZ,
+            pdc_rate_hz: ROW_RATE_HZ.into(),
             outside_mn: None,
             pace: None,
-            shear_rate_hz: ROW_RATE_HZ,
+            shear_rate_hz: ROW_RATE_HZ.into(),
             highest_hz: None,
         };
         let imported = |why| {

@@ -45,8 +45,8 @@ pub(crate) fn check(slide: &Recording) -> Result<Option<SlideError>, SampleFault
     };
     signal(&slide.still())?;
     let clipped = signal(steady)?;
-    let seconds = |samples: usize, rate_hz: u32| samples as f64 / f64::from(rate_hz);
-    let lasts = seconds(pac.len(), PAC_RATE_HZ);
+    let seconds = |samples: usize, rate_hz: f64| samples as f64 / rate_hz;
+    let lasts = seconds(pac.len(), PAC_RATE_HZ.into());
     let shear = slide.shear_mn().map(|mn| (mn.len(), slide.shear_rate_hz));
     // without samples it was not measured
     let pdc = Some((slide.pdc.len(), slide.pdc_rate_hz)).filter(|(samples, _)| *samples > 0);

@@ -143,8 +143,9 @@ impl Recorder {
         } else {
             (slide.pdc, PAC_RATE_HZ)
         };
-        let recording = Recording::from_blocks(movement, slide.blocks, pdc, rate_hz, samples(1000))
-            .ok_or(RecordError::NoSamples)?;
+        let recording =
+            Recording::from_blocks(movement, slide.blocks, pdc, rate_hz.into(), samples(1000))
+                .ok_or(RecordError::NoSamples)?;
         self.numbers += 1;
         Ok(Recording {
             texture,

@@ -12,7 +12,10 @@ use crate::data::recordings::npy::MAX_SAMPLES;
 
 /// Rate of P_AC in every recording: the BioTac's 2200 Hz.
 pub const PAC_RATE_HZ: u32 = RATE_HZ;
-const SHEAR_HZ: u32 = 1000;
+const SHEAR_HZ: f64 = 1000.0;
+/// A remedy where a force or a speed is out of its range.
+pub(crate) const LEAVE_OUT: &str =
+    "leave it out where it is unknown, or not of a finger that slides";
 
 /// One slide over one texture.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -34,14 +37,14 @@ pub struct Recording {
     /// P_DC in counts about the still baseline, from the start of the record; empty if not measured.
     pub pdc: Vec<i16>,
     /// Rate of [`pdc`](Self::pdc) in Hz.
-    pub pdc_rate_hz: u32,
+    pub pdc_rate_hz: f64,
     /// Tangential force in mN before and after constant speed, positive against the motion; `None` if the rig could not
     /// measure it.
     pub outside_mn: Option<[Vec<i16>; 2]>,
     /// Speed of the slide, if measured: see [`Observation::pace`](tactus_core::features::Observation::pace).
     pub pace: Option<i16>,
     /// Rate of the tangential force in Hz, also where there is none.
-    pub shear_rate_hz: u32,
+    pub shear_rate_hz: f64,
     /// Highest frequency that the sensor measured, Hz, where that is less than P_AC's rate can carry.
     pub highest_hz: Option<f32>,
 }
@@ -103,12 +106,12 @@ impl Recording {
         movement: Movement,
         blocks: Vec<Block>,
         pdc: Vec<i16>,
-        pdc_rate_hz: u32,
+        pdc_rate_hz: f64,
         ms: usize,
     ) -> Option<Self> {
         let (from, to) = blocks.iter().find_map(|block| block.steady)?;
         let seconds = |sample: u32| sample as f32 / PAC_RATE_HZ as f32;
-        let before = (seconds(from) * SHEAR_HZ as f32).round() as usize;
+        let before = (f64::from(seconds(from)) * SHEAR_HZ).round() as usize;
         let inside: usize = blocks.iter().map(|block| block.shear_mn.len()).sum();
         let after = ms.saturating_sub(before + inside);
         let recording = Self {
@@ -229,9 +232,10 @@ impl Recording {
     }
 
     /// The part at constant speed as sample numbers of a stream with `rate_hz`.
-    pub fn steady(&self, rate_hz: u32) -> Range<usize> {
+    pub fn steady(&self, rate_hz: impl Into<f64>) -> Range<usize> {
+        let rate_hz = rate_hz.into();
         // `as` saturates and turns not-a-number into 0
-        let sample = |s: f32| (f64::from(s) * f64::from(rate_hz)).round() as usize;
+        let sample = |s: f32| (f64::from(s) * rate_hz).round() as usize;
         sample(self.window.0)..sample(self.window.1)
     }
 
@@ -243,7 +247,7 @@ impl Recording {
             ));
         }
         let streams = [
-            ("P_AC", PAC_RATE_HZ, Some(self.pac().len())),
+            ("P_AC", f64::from(PAC_RATE_HZ), Some(self.pac().len())),
             (
                 "P_DC",
                 self.pdc_rate_hz,
@@ -259,7 +263,7 @@ impl Recording {
             let Some(samples) = samples else {
                 continue;
             };
-            if rate_hz == 0 || rate_hz > 100_000 {
+            if !(rate_hz > 0.0 && rate_hz <= 100_000.0) {
                 return Err(format!("a rate of {rate_hz} Hz for {stream} is impossible"));
             }
             if samples > MAX_SAMPLES {

@@ -51,6 +51,15 @@ impl Rows {
             .map_err(|e| header_error(cause_of(e)))?
             .clone();
         let there = |name: &&&'static str| header.iter().any(|h| h == **name);
+        let missing = columns.iter().filter(|name| !there(name)).copied();
+        let missing: Vec<&str> = missing.collect();
+        if !missing.is_empty() {
+            let found: Vec<&str> = header.iter().take(50).collect();
+            let (missing, found) = (missing.join(", "), found.join(","));
+            return Err(header_error(format!(
+                "no column {missing} in the header ({found})"
+            )));
+        }
         let columns = columns
             .iter()
             .chain(optional.iter().filter(there))
@@ -58,16 +67,7 @@ impl Rows {
                 let mut at = (0..).zip(&header).filter(|(_, h)| *h == name);
                 match (at.next(), at.next()) {
                     (Some((i, _)), None) => Ok((name, i)),
-                    (None, _) => {
-                        let found: Vec<&str> = header.iter().take(50).collect();
-                        let found = found.join(",");
-                        Err(header_error(format!(
-                            "no column {name} in the header ({found})"
-                        )))
-                    }
-                    (Some(_), Some(_)) => {
-                        Err(header_error(format!("two columns {name} in the header")))
-                    }
+                    _ => Err(header_error(format!("two columns {name} in the header"))),
                 }
             })
             .collect::<Result<_, _>>()?;

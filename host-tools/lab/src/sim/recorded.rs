@@ -150,7 +150,7 @@ impl RecordedTexture {
 fn played(slide: &Recording) -> Option<Played> {
     let shear_mn = slide
         .shear_mn()
-        .filter(|_| slide.shear_rate_hz == SHEAR_HZ)?;
+        .filter(|_| slide.shear_rate_hz == f64::from(SHEAR_HZ))?;
     Some(Played {
         pac: slide.pac().get(slide.steady(PAC_RATE_HZ))?.to_vec(),
         shear_mn: shear_mn.get(slide.steady(SHEAR_HZ))?.to_vec(),

@@ -428,7 +428,7 @@ impl SimRig {
             taken.push(blocks.end(0));
             match ended {
                 Ok(Ended::Whole) => {
-                    let slide = Recording::from_blocks(movement, taken, pdc, RATE_HZ, ms);
+                    let slide = Recording::from_blocks(movement, taken, pdc, RATE_HZ.into(), ms);
                     return slide.ok_or(failed);
                 }
                 Ok(_) => {}

@@ -429,10 +429,10 @@ impl Survey {
             blocks: Vec::new(),
             background: still.is_none().then_some(0.0),
             pdc: pdc.map(slow).unwrap_or_default(),
-            pdc_rate_hz: SLOW_HZ,
+            pdc_rate_hz: SLOW_HZ.into(),
             outside_mn: None,
             pace: None,
-            shear_rate_hz: SLOW_HZ,
+            shear_rate_hz: SLOW_HZ.into(),
             highest_hz: match self.is_stretched() {
                 true => None,
                 false => {

@@ -112,7 +112,7 @@ fn the_publishers_files_are_read() {
             assert_eq!(slide.movement.to_string(), "0.80 N, 25.0 mm/s");
             assert_eq!(
                 (slide.pdc_rate_hz, slide.shear_rate_hz, slide.window),
-                (100, 100, (0.5, 5.5))
+                (100.0, 100.0, (0.5, 5.5))
             );
             // held at the first force before it was measured, else on the line
             let shear = slide.shear_mn().unwrap();

@@ -227,10 +227,10 @@ impl Manifest {
                     blocks: Vec::new(),
                     background: Some(BACKGROUND_POWER),
                     pdc: field(pdc).to_vec(),
-                    pdc_rate_hz: pdc.rate_hz,
+                    pdc_rate_hz: pdc.rate_hz.into(),
                     outside_mn: None,
                     pace: None,
-                    shear_rate_hz: shear.unwrap_or(pdc).rate_hz,
+                    shear_rate_hz: shear.unwrap_or(pdc).rate_hz.into(),
                     highest_hz: None,
                 };
                 let slide = slide.cut(&[], field(pac), shear.map(field));

@@ -3,24 +3,27 @@
 //!
 //! | column | what it holds |
 //! |---|---|
-//! | `texture` | number of the texture; the same number always has the same name |
 //! | `name` | name of the texture, without spaces around it |
-//! | `slide` | number of the slide; slides of a texture are numbered in the order of time, each number once |
-//! | `force_n`, `speed_mm_s` | the movement: contact force in N, sliding speed in mm/s; both empty if unknown |
-//! | `window_start_s`, `window_end_s` | the steady part, in s from the start of the record |
-//! | `background_power` | power of P_AC without texture after the band-pass, in counts^2 |
-//! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; both empty if not measured |
 //! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
+//! | `texture` | number of the texture; the same number always has the same name; empty: the next that is free |
+//! | `slide` | number of the slide of its texture, in the order of time, each once; empty: the one after the row before |
+//! | `force_n`, `speed_mm_s` | the movement: contact force in N, sliding speed in mm/s; empty if unknown |
+//! | `window_start_s`, `window_end_s` | the steady part, in s from the start of the record; empty for its start and end |
+//! | `background_power` | power of P_AC without texture after the band-pass, in counts^2; empty if not measured |
+//! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; empty if not measured |
 //! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline; empty if not measured |
 //! | `shear_file`, `shear_rate_hz`, `shear_sha256` | tangential force against the motion, mN; empty if not measured |
-//! | `lot`, `operator`, `note` | batch or piece, operator, remark; may be empty or missing |
-//! | `moved` | sample moved or turned since the slide before: `yes`, `no`, or empty or missing if unknown |
-//! | `session`, `run` | session, and run of the machine in it; may be empty or missing |
-//! | `finger` | the finger: `biotac`, `analog`, `mems`, or the name of another sensor; empty or missing for a BioTac |
-//! | `highest_hz` | highest frequency that the sensor measures, Hz; empty or missing for 1100 |
-//! | `calibrated` | day of the force calibration, as 20261121; 1: day unknown; empty, 0 or missing: none, or unknown |
-//! | `pace` | ln(mean speed / `speed_mm_s`) in 1/1024, by a sensor of motion; empty or missing if not measured |
-//! | `version` | version of this format, 1; empty or missing for 1 |
+//! | `lot`, `operator`, `note` | batch or piece, operator, remark |
+//! | `moved` | sample moved or turned since the slide before: `yes`, `no`, or empty if unknown |
+//! | `session`, `run` | session, and run of the machine in it |
+//! | `finger` | the finger: `biotac`, `analog`, `mems`, or the name of another sensor; empty for a BioTac |
+//! | `highest_hz` | highest frequency that the sensor measures, Hz; empty for 1100 |
+//! | `calibrated` | day of the force calibration, as 20261121; 1: day unknown; 0 or empty: none, or unknown |
+//! | `pace` | ln(mean speed / `speed_mm_s`) in 1/1024, by a sensor of motion; empty if not measured |
+//! | `version` | version of this format, 1; empty for 1 |
+//!
+//! `name`, `pac_file` and `pac_rate_hz` must be there. Any other cell may be empty, and any other column missing. The
+//! rate of P_DC and of shear, where it is empty, is that by which their samples last as long as those of P_AC.
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it, and
 //! symbolic links do not lead out; each is a one-dimensional array of `<i2` (numpy.int16) of 262144 samples at most.
@@ -34,6 +37,7 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry as Place;
 use std::path::Path;
+use std::str::FromStr;
 
 use tactus_core::features::Movement;
 use tactus_core::sensor::FingerCode;
@@ -44,7 +48,7 @@ use super::files::{
     in_order_of_time, inside, read_named,
 };
 use super::npy;
-use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
+use crate::data::recording::{LEAVE_OUT, Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
 use crate::data::rows::{Row, Rows};
 
 /// Its columns, in the order in which they are written.
@@ -70,8 +74,10 @@ pub const COLUMNS: [&str; 19] = [
     "shear_sha256",
 ];
 
-/// Rate of P_DC and shear, Hz, where a row does not say.
-const SLOW_HZ: u32 = 100;
+/// Those of [`COLUMNS`] that no recording does without.
+const NEEDED: [&str; 3] = ["name", "pac_file", "pac_rate_hz"];
+/// Rate of P_DC and shear, Hz, where they were not measured.
+const SLOW_HZ: f64 = 100.0;
 
 /// Version of the format.
 pub const VERSION: u32 = 1;
@@ -103,13 +109,13 @@ struct Entry {
     number: u32,
     movement: Movement,
     labels: Labels,
-    window: (f32, f32),
+    window: [Option<f32>; 2],
     background: Background,
     pac: Stream,
     pdc: Option<Stream>,
-    pdc_rate_hz: u32,
+    pdc_rate_hz: Option<f64>,
     shear: Option<Stream>,
-    shear_rate_hz: u32,
+    shear_rate_hz: Option<f64>,
     pace: Option<i16>,
     highest_hz: Option<f32>,
 }
@@ -134,13 +140,13 @@ impl Manifest {
         let path = &inside(folder, MANIFEST, MANIFEST)?;
         let mut textures: Vec<(Texture, Vec<Entry>)> = Vec::new();
         let mut places: HashMap<Texture, usize> = HashMap::new();
-        let mut rows = Rows::open(path, &COLUMNS, &LABELS)?;
+        let optional = COLUMNS.into_iter().filter(|name| !NEEDED.contains(name));
+        let optional: Vec<&str> = optional.chain(LABELS).collect();
+        let mut rows = Rows::open(path, &NEEDED, &optional)?;
+        let mut numbers = Numbers::default();
         while let Some(row) = rows.next_row()? {
-            let texture = Texture {
-                id: row.parse("texture", "the number of a texture")?,
-                name: row.shown("name")?.to_owned(),
-            };
-            let entry = Entry::of(&row)?;
+            let texture = numbers.texture(&row)?;
+            let entry = Entry::of(&row, numbers.slide(&row, texture.id)?)?;
             match places.entry(texture) {
                 Place::Occupied(place) => textures[*place.get()].1.push(entry),
                 Place::Vacant(place) => {
@@ -191,8 +197,56 @@ impl Manifest {
     }
 }
 
+/// The numbers of textures and slides where rows do not say them.
+#[derive(Default)]
+struct Numbers {
+    /// the number of a texture by its name, and the largest one
+    textures: HashMap<String, u32>,
+    most: u32,
+    /// the last slide of each texture
+    slides: HashMap<u32, u32>,
+}
+
+impl Numbers {
+    fn texture(&mut self, row: &Row<'_>) -> Result<Texture> {
+        let name = row.shown("name")?;
+        let id = match row.text("texture") {
+            "" if name.is_empty() => {
+                return Err(row.error(Some("name"), "is empty; give the texture's name"));
+            }
+            "" => self.textures.get(name).copied(),
+            _ => Some(row.parse("texture", "the number of a texture")?),
+        };
+        let id = id.unwrap_or(self.most.saturating_add(1));
+        self.most = self.most.max(id);
+        self.textures.entry(name.to_owned()).or_insert(id);
+        Ok(Texture {
+            id,
+            name: name.to_owned(),
+        })
+    }
+
+    fn slide(&mut self, row: &Row<'_>, texture: u32) -> Result<u32> {
+        let last = self.slides.entry(texture).or_default();
+        *last = match row.text("slide") {
+            "" => last.saturating_add(1),
+            _ => row.parse("slide", "the number of a slide")?,
+        };
+        Ok(*last)
+    }
+}
+
+/// A number that may be unknown.
+fn optional<T>(row: &Row<'_>, column: &'static str) -> Result<Option<T>>
+where
+    T: FromStr + Into<f64> + Copy,
+{
+    let there = !row.text(column).is_empty();
+    there.then(|| row.number(column)).transpose()
+}
+
 impl Entry {
-    fn of(row: &Row<'_>) -> Result<Self> {
+    fn of(row: &Row<'_>, number: u32) -> Result<Self> {
         if !row.text("version").is_empty() {
             let version: u32 = row.parse("version", "the number of a version")?;
             if version != VERSION {
@@ -203,25 +257,20 @@ impl Entry {
                 return Err(row.error(Some("version"), cause));
             }
         }
-        let rate = |column| match row.text(column) {
-            "" => Ok(SLOW_HZ),
-            _ => row.parse(column, "a rate in whole Hz"),
-        };
-        let movement = match (row.text("force_n"), row.text("speed_mm_s")) {
-            ("", "") => Movement::UNKNOWN,
-            _ => Movement::from_si(row.number("force_n")?, row.number("speed_mm_s")?)
-                .map_err(|e| row.error(None, e.to_string()))?,
-        };
-        let pac_rate_hz: u32 = row.parse("pac_rate_hz", "a rate in whole Hz")?;
-        if pac_rate_hz != PAC_RATE_HZ {
-            let cause = format!("{pac_rate_hz} Hz; all of Tactus counts on {PAC_RATE_HZ} Hz");
+        let movement = Movement::partly(optional(row, "force_n")?, optional(row, "speed_mm_s")?)
+            .map_err(|why| row.error(None, format!("{why}; {LEAVE_OUT}")))?;
+        let pac_rate_hz: f64 = row.number("pac_rate_hz")?;
+        if pac_rate_hz != f64::from(PAC_RATE_HZ) {
+            let cause = format!(
+                "{pac_rate_hz} Hz, and recordings have {PAC_RATE_HZ} Hz: put the .npy files alone into a folder, and \
+                 `tactus import FOLDER NEW --rate {pac_rate_hz}` resamples them"
+            );
             return Err(row.error(Some("pac_rate_hz"), cause));
         }
         let still = Stream::of(row, "background_file", "background_sha256")?;
         let background = match (row.text("background_power"), still) {
             ("", Some(still)) => Background::Still(still),
-            ("", None) => Background::Power(0.0),
-            (_, None) => Background::Power(row.number("background_power")?),
+            (_, None) => Background::Power(optional(row, "background_power")?.unwrap_or(0.0)),
             (_, Some(_)) => {
                 let why = "there is a background_file too; leave one of them empty";
                 return Err(row.error(Some("background_power"), why));
@@ -230,24 +279,24 @@ impl Entry {
         let pac = Stream::of(row, "pac_file", "pac_sha256")?;
         Ok(Self {
             line: row.line(),
-            number: row.parse("slide", "the number of a slide")?,
+            number,
             movement,
             labels: labels(row)?,
-            window: (row.number("window_start_s")?, row.number("window_end_s")?),
+            window: [
+                optional(row, "window_start_s")?,
+                optional(row, "window_end_s")?,
+            ],
             background,
             pac: pac.ok_or_else(|| row.error(Some("pac_file"), "no file is named"))?,
             pdc: Stream::of(row, "pdc_file", "pdc_sha256")?,
-            pdc_rate_hz: rate("pdc_rate_hz")?,
+            pdc_rate_hz: optional(row, "pdc_rate_hz")?,
             shear: Stream::of(row, "shear_file", "shear_sha256")?,
-            shear_rate_hz: rate("shear_rate_hz")?,
+            shear_rate_hz: optional(row, "shear_rate_hz")?,
             pace: match row.text("pace") {
                 "" => None,
                 _ => Some(row.parse("pace", "a whole number of 1/1024")?),
             },
-            highest_hz: match row.text("highest_hz") {
-                "" => None,
-                _ => Some(row.number("highest_hz")?),
-            },
+            highest_hz: optional(row, "highest_hz")?,
         })
     }
 
@@ -259,18 +308,30 @@ impl Entry {
             Background::Power(power) => (Some(*power), Vec::new()),
             Background::Still(still) => (None, still.load(folder)?),
         };
+        let seconds = pac.len() as f64 / f64::from(PAC_RATE_HZ);
+        // all streams cover the same time
+        let rate = |said: Option<f64>, samples: Option<&Vec<i16>>| {
+            let lasts = samples.map_or(SLOW_HZ, |all| all.len() as f64 / seconds.max(1e-3));
+            said.unwrap_or(lasts)
+        };
+        let pdc_rate_hz = rate(self.pdc_rate_hz, pdc.as_ref());
+        let shear_rate_hz = rate(self.shear_rate_hz, shear.as_ref());
+        let ends = [(&pdc, pdc_rate_hz), (&shear, shear_rate_hz)];
+        let ends = ends.map(|(samples, rate_hz)| Some(samples.as_ref()?.len() as f64 / rate_hz));
+        let last = ends.into_iter().flatten().fold(seconds, f64::min);
+        let [start, end] = self.window;
         let slide = Recording {
             texture,
             number: self.number,
             movement: self.movement,
-            window: self.window,
+            window: (start.unwrap_or(0.0), end.unwrap_or(last as f32)),
             blocks: Vec::new(),
             background,
+            pdc_rate_hz,
             pdc: pdc.unwrap_or_default(),
-            pdc_rate_hz: self.pdc_rate_hz,
             outside_mn: None,
             pace: self.pace,
-            shear_rate_hz: self.shear_rate_hz,
+            shear_rate_hz,
             highest_hz: self.highest_hz,
         };
         let slide = slide.cut(&still, &pac, shear.as_deref());

@@ -27,10 +27,10 @@ fn slide(texture: usize, number: u32) -> Recording {
         blocks: Vec::new(),
         background: Some(2.2),
         pdc: vec![base; 10],
-        pdc_rate_hz: 100,
+        pdc_rate_hz: 100.0,
         outside_mn: None,
         pace: None,
-        shear_rate_hz: 110,
+        shear_rate_hz: 110.0,
         highest_hz: None,
     };
     slide.cut(&[], &pac, Some(&[-base; 11])).unwrap()
@@ -146,15 +146,14 @@ fn a_folder_that_is_missing_or_empty_says_where_recordings_are() {
 #[test]
 fn own_manifest_errors_name_line_and_column() {
     const CASES: &str = r#"
-force_n | force | manifest.csv:1: | no column force_n
+pac_rate_hz | rate | manifest.csv:1: | no column pac_rate_hz in
 pac_sha256 | pac_file | manifest.csv:1: | two columns pac_file
 0.200 | NaN | manifest.csv:2: column force_n | not a finite number
 0.200 | -inf | manifest.csv:2: column force_n | not a finite number
 0.200 | 9 | manifest.csv:2: | contact force 9000 mN is outside
 7, | seven, | manifest.csv:2: column texture | "seven" is not the number of a texture
 ,4, | ,-4, | manifest.csv:3: column slide | "-4" is not the number of a slide
-,4,0.502, | ,4,, | manifest.csv:3: column force_n | "" is not a number
-,2200, | ,2000, | manifest.csv:2: column pac_rate_hz | 2000 Hz
+,2200, | ,2000.5, | column pac_rate_hz: 2000.5 Hz, and | `tactus import FOLDER NEW --rate 2000.5`
 ,100, | ,0, | manifest.csv: line 2 | 0 Hz for P_DC is impossible
 0.02,0.1, | 0.1,0.1, | manifest.csv: line 2 | is not a stretch of time
 0.02,0.1, | 0.02,0.2, | manifest.csv: line 2 | P_AC (samples: 220
@@ -173,6 +172,98 @@ biotac,,,1 | biotac,,,2 | manifest.csv:2: column version | version 2, and this p
         edit(&folder.path().join(OWN_MANIFEST), from, to);
         fails(folder.path(), &[place, cause]);
     }
+}
+
+/// A manifest with some columns alone; those of `emptied` stay, without what they hold.
+fn with_columns(path: &Path, keep: impl Fn(&str) -> bool, emptied: bool) {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let mut written = csv::Writer::from_writer(Vec::new());
+    let rows = std::iter::once(header.clone()).chain(reader.records().map(|row| row.unwrap()));
+    for (line, row) in rows.enumerate() {
+        let cells = header.iter().zip(&row);
+        let cells = cells.filter(|(column, _)| emptied || keep(column));
+        let cells = cells.map(|(column, cell)| if line == 0 || keep(column) { cell } else { "" });
+        written.write_record(cells).unwrap();
+    }
+    fs::write(path, written.into_inner().unwrap()).unwrap();
+}
+
+#[test]
+fn each_column_but_three_may_be_missing_or_empty() {
+    let needed = ["name", "pac_file", "pac_rate_hz"];
+    let pairs = [
+        ("pac_sha256", ""),
+        ("pdc_file", "pdc_sha256"),
+        ("shear_file", "shear_sha256"),
+        ("background_file", "background_sha256"),
+    ];
+    for column in own::COLUMNS.into_iter().chain(own::LABELS) {
+        // without a file there is no hash of it
+        let pair = pairs.iter().find(|(file, _)| *file == column);
+        let gone = |name: &str| name == column || pair.is_some_and(|(_, hash)| *hash == name);
+        for emptied in [false, true] {
+            let (folder, slides) = own();
+            let path = folder.path().join(OWN_MANIFEST);
+            with_columns(&path, |name| !gone(name), emptied);
+            if needed.contains(&column) && !(emptied && column == "name") {
+                fails(folder.path(), &["manifest.csv:", column]);
+                continue;
+            }
+            let loaded = load(folder.path()).unwrap();
+            let pac = |slides: &[Recording]| slides.iter().map(Recording::pac).collect::<Vec<_>>();
+            if column != "name" {
+                assert_eq!(pac(&loaded), pac(&slides), "{column}");
+            }
+        }
+    }
+    // one that has nothing else: rows are in the order of time
+    let (folder, slides) = own();
+    let path = folder.path().join(OWN_MANIFEST);
+    with_columns(&path, |name| needed.contains(&name), false);
+    let set = RecordingSet::open(folder.path()).unwrap();
+    assert_eq!(
+        set.textures(),
+        [texture(1, "cotton, washed"), texture(2, "felt")]
+    );
+    let loaded = load(folder.path()).unwrap();
+    for (slide, whole) in loaded.iter().zip(&slides) {
+        assert_eq!(slide.pac(), whole.pac());
+        assert_eq!(slide.window, (0.0, 0.1));
+        assert_eq!(slide.movement, Movement::UNKNOWN);
+        assert_eq!((slide.background, &slide.pdc[..]), (Some(0.0), &[][..]));
+        assert_eq!(slide.outside_mn, None);
+    }
+    assert_eq!(
+        loaded.iter().map(|slide| slide.number).collect::<Vec<_>>(),
+        [1, 2, 1, 2]
+    );
+}
+
+#[test]
+fn a_force_alone_a_speed_alone_and_rates_that_are_no_whole_numbers_are_kept() {
+    let (folder, _) = own();
+    let path = folder.path().join(OWN_MANIFEST);
+    // 10 samples of P_DC are 0.1 s
+    edit(&path, ",0.502,25.119,", ",,25.119,");
+    edit(&path, ",0.502,25.119,", ",0.502,,");
+    edit(&path, "t007_s004_pdc.npy,100,", "t007_s004_pdc.npy,100.5,");
+    edit(&path, "t003_s001_pdc.npy,100,", "t003_s001_pdc.npy,,");
+    let slides = load(folder.path()).unwrap();
+    let told: Vec<_> = slides.iter().map(|s| s.movement.to_string()).collect();
+    assert_eq!(
+        told[1..],
+        ["25.1 mm/s", "0.50 N", "0.50 N, 25.1 mm/s"],
+        "{told:?}"
+    );
+    assert_eq!(
+        (slides[1].pdc_rate_hz, slides[2].pdc_rate_hz),
+        (100.5, 100.0)
+    );
+    // and they are written as they were read
+    let copy = TempDir::new().unwrap();
+    write_own(copy.path(), &slides);
+    assert_eq!(load(copy.path()).unwrap(), slides);
 }
 
 #[test]

@@ -271,9 +271,9 @@ fn row(
         Some(shear) => stream("shear", &shear)?,
         None => none(),
     };
-    let known = |value| match slide.movement.is_known() {
-        true => thousandths(value),
-        false => String::new(),
+    let known = |value| match value {
+        0 => String::new(),
+        _ => thousandths(value),
     };
     let mut row = vec![
         texture.id.to_string(),
@@ -287,7 +287,7 @@ fn row(
     ];
     row.extend(background);
     for ([file, sha256], rate) in [
-        (pac, PAC_RATE_HZ),
+        (pac, PAC_RATE_HZ.into()),
         (pdc, slide.pdc_rate_hz),
         (shear, slide.shear_rate_hz),
     ] {

@@ -11,7 +11,7 @@ use crate::data::import::cut::{Parts, parts};
 use crate::data::import::resample::{RATES_HZ, resample};
 use crate::data::import::settings::{Named, Settings};
 use crate::data::import::signals::{Piece, Signals};
-use crate::data::recording::PAC_RATE_HZ;
+use crate::data::recording::{LEAVE_OUT, PAC_RATE_HZ};
 
 /// Samples of the slides into which longer sliding is divided: 3 s, and what a slow sensor can have in 20 s.
 const LENGTH: usize = 6600;
@@ -242,14 +242,7 @@ fn movement(named: &Named, settings: &Settings) -> Result<Movement, String> {
         named.force.or(settings.force),
         named.speed.or(settings.speed),
     );
-    match (force, speed) {
-        (None, None) => Ok(Movement::UNKNOWN),
-        (Some(force), Some(speed)) => Movement::from_si(force, speed).map_err(|why| {
-            format!("{why}; without force and speed the movement is unknown, which is allowed")
-        }),
-        (Some(_), None) => Err("only the force is known: give --speed, too, or neither".to_owned()),
-        (None, Some(_)) => Err("only the speed is known: give --force, too, or neither".to_owned()),
-    }
+    Movement::partly(force, speed).map_err(|why| format!("{why}; {LEAVE_OUT}"))
 }
 
 /// Words, each with the row behind its last one in a row; `None` where no column says them.

@@ -77,10 +77,10 @@ fn biotac_layout_is_taken_from_the_manifest() {
         blocks: Vec::new(),
         background: Some(2.2),
         pdc: (940..943).collect(),
-        pdc_rate_hz: 500,
+        pdc_rate_hz: 500.0,
         outside_mn: None,
         pace: None,
-        shear_rate_hz: 400,
+        shear_rate_hz: 400.0,
         highest_hz: None,
     };
     let expected = expected.cut(&[], &pac, Some(&[943, 944])).unwrap();

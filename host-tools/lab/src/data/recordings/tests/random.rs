@@ -15,7 +15,7 @@ proptest! {
         id: u32, number: u32,
         force_mn in 100_u16..=2000, speed_um_s in 5_000_u32..=150_000,
         pac in proptest::collection::vec(any::<i16>(), 220..300),
-        pdc_rate_hz in 1_u32..100, start in 0.0_f32..0.05, length in 0.01_f32..0.05,
+        pdc_rate_hz in 1.0_f64..100.0, start in 0.0_f32..0.05, length in 0.01_f32..0.05,
         power in proptest::option::of(0.0_f32..1e9),
         shear in proptest::option::of(proptest::collection::vec(any::<i16>(), 10..20)),
     ) {
@@ -32,7 +32,7 @@ proptest! {
             pdc_rate_hz,
             outside_mn: None,
             pace: None,
-            shear_rate_hz: 100,
+            shear_rate_hz: 100.0,
             highest_hz: None,
         };
         let slide = slide.cut(still, &pac, shear.as_deref()).unwrap();
