@@ -1,5 +1,6 @@
 //! Tests of the command `tactus` as a person or a script uses it, and of the examples.
 
+mod by_hand;
 mod convert;
 mod device;
 mod endings;

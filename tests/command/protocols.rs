@@ -132,6 +132,23 @@ fn no_command_tests_a_slide_that_the_table_was_learned_from() {
         "copy/manifest.csv",
         format!("{head}\n{}\n", rows.join("\n")),
     );
+    // the same samples, begun 37 later
+    at.recordings("shifted", |line| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        let hash = cells.iter().position(|cell| *cell == "2200");
+        if let Some(rate) = hash {
+            cells[rate + 1] = "";
+        }
+        Some(cells.join(","))
+    });
+    for entry in fs::read_dir(at.path("shifted")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.to_string_lossy().ends_with("_pac.npy") {
+            let mut file = fs::read(&path).unwrap();
+            file[128..].rotate_left(2 * 37);
+            fs::write(&path, file).unwrap();
+        }
+    }
     let slides = |told: &serde_json::Value| -> BTreeSet<u64> {
         let slides = array(&told["slides"]).iter();
         slides
@@ -152,7 +169,7 @@ fn no_command_tests_a_slide_that_the_table_was_learned_from() {
         at.printed(&format!(
             "learn --recordings SIMULATED --train-slides 2 {how} --out table --force"
         ));
-        for folder in ["SIMULATED", "copy"] {
+        for folder in ["SIMULATED", "copy", "shifted"] {
             let identify =
                 format!("identify --table table --recordings {folder} --material Burlap");
             let text = at.printed(&format!("{identify} --threshold 1"));
@@ -220,10 +237,18 @@ fn no_command_tests_a_slide_that_the_table_was_learned_from() {
     assert_eq!(told["learned_left_out"], 6);
     assert_eq!(told["learned_all_known"], true);
     // test slides of a second folder
-    let evaluate =
-        "evaluate --recordings SIMULATED --test copy --train-slides 2 --runs 20 --protocol drift";
+    for test in ["copy", "shifted"] {
+        let evaluate = format!(
+            "evaluate --recordings SIMULATED --test {test} --train-slides 2 --runs 20 --protocol drift"
+        );
+        assert_says(
+            &at.printed(&evaluate),
+            &["Left out of the test, as they may be learned from: 36 slides."],
+        );
+    }
+    let shifted = itself.replace("copy", "shifted");
     assert_says(
-        &at.printed(evaluate),
-        &["Left out of the test, as they may be learned from: 36 slides."],
+        &at.error(&shifted, 1),
+        &["learned from every slide of Burlap"],
     );
 }

@@ -328,11 +328,8 @@ fn what_cannot_be_read_says_what_to_do() {
                 "columns of words are none",
             ],
         ),
-        ("--speed 30", &["only the speed is known: give --force"]),
-        (
-            "--force 70 --speed 30",
-            &["70", "unknown, which is allowed"],
-        ),
+        ("--speed 300", &["300000 um/s", "leave it out"]),
+        ("--force 70 --speed 30", &["70", "leave it out"]),
         ("--window 5,2", &["FROM,TO in seconds"]),
         (
             "--window 0,0.2",

@@ -8,6 +8,7 @@ use tactus_core::features::Movement;
 use tactus_core::features::{Property, PropertySet};
 use tactus_core::probe::explore::{ExplorationStep, explore};
 use tactus_core::table::Table;
+use tactus_lab::data::quality::SlideMarks;
 use tactus_lab::data::recording::Recording;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{MeasuredSlide, measure};
@@ -151,7 +152,7 @@ fn without_a_rig(set: &RecordingSet, method: Method, train: usize) -> f64 {
             number: slide.number,
             movement: slide.movement,
             measurement: measure(&plan, &stretch(slide, STRETCH_S)).unwrap(),
-            hash: slide.hash(),
+            marks: SlideMarks::of(slide),
             session: Default::default(),
             given: None,
         };

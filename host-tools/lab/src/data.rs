@@ -5,7 +5,7 @@ pub mod import;
 pub mod printable;
 pub mod program;
 pub mod properties;
-mod quality;
+pub mod quality;
 pub mod recorder;
 pub mod recording;
 pub mod recordings;

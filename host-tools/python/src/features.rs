@@ -45,13 +45,13 @@ impl Features {
 
 #[pymethods]
 impl Features {
-    /// Contact force of the movement, N.
+    /// Contact force of the movement, N; 0 where it is unknown.
     #[getter]
     fn force_n(&self) -> f32 {
         self.movement.force_n()
     }
 
-    /// Speed of the movement, mm/s.
+    /// Speed of the movement, mm/s; 0 where it is unknown.
     #[getter]
     fn speed_mm_s(&self) -> f32 {
         self.movement.speed_mm_s()
@@ -151,22 +151,25 @@ pub(crate) fn plan() -> &'static Plan {
 }
 
 pub(crate) fn movement(force_n: f32, speed_mm_s: f32) -> PyResult<Movement> {
-    Movement::from_si(force_n, speed_mm_s).map_err(|why| why.raise())
+    // 0 is what an unknown one is told as
+    let known = |value: f32| (value != 0.0).then_some(value);
+    Movement::partly(known(force_n), known(speed_mm_s)).map_err(|why| why.raise())
 }
 
 /// The `Features` of a slide of which the samples are here.
 ///
 /// pac: P_AC at 2200 Hz in counts about the still baseline, from the start of the record: an array of shape (samples,)
 /// or a list of whole numbers that 16 bits hold; it is copied before other threads run, and so are the other samples.
-/// window_s: start and end of the part at constant speed, s. force_n, speed_mm_s: the movement. still: P_AC of the
-/// finger at rest (2200 Hz), or background: its power after the band-pass, counts^2. One is needed. shear_mn:
-/// tangential force, mN, at shear_rate_hz. pdc: P_DC, counts, at pdc_rate_hz. Both from the same start.
+/// window_s: start and end of the part at constant speed, s. What follows is None where it is unknown. force_n,
+/// speed_mm_s: the movement. still: P_AC of the finger at rest (2200 Hz), or background: its power after the band-pass,
+/// counts^2. shear_mn: tangential force, mN, at shear_rate_hz. pdc: P_DC, counts, at pdc_rate_hz. Both from the same
+/// start.
 ///
 /// Raises SlideError where there are no features in it; TypeError for samples that are no whole numbers; ValueError for
 /// another shape, masked samples, and numbers beyond 16 bits; KeyboardInterrupt after Ctrl-C.
 #[pyfunction]
-#[pyo3(signature = (pac, *, window_s, force_n, speed_mm_s, still=None, background=None, shear_mn=None,
-    shear_rate_hz=100, pdc=None, pdc_rate_hz=100))]
+#[pyo3(signature = (pac, *, window_s, force_n=None, speed_mm_s=None, still=None, background=None, shear_mn=None,
+    shear_rate_hz=100.0, pdc=None, pdc_rate_hz=100.0))]
 #[expect(
     clippy::too_many_arguments,
     reason = "all but the first have names where it is called"
@@ -175,19 +178,19 @@ fn features(
     py: Python<'_>,
     pac: &Bound<'_, PyAny>,
     window_s: (f32, f32),
-    force_n: f32,
-    speed_mm_s: f32,
+    force_n: Option<f32>,
+    speed_mm_s: Option<f32>,
     still: Option<&Bound<'_, PyAny>>,
     background: Option<f32>,
     shear_mn: Option<&Bound<'_, PyAny>>,
-    shear_rate_hz: u32,
+    shear_rate_hz: f64,
     pdc: Option<&Bound<'_, PyAny>>,
-    pdc_rate_hz: u32,
+    pdc_rate_hz: f64,
 ) -> PyResult<Features> {
     let of = |name, given: Option<&Bound<'_, PyAny>>| {
         given.map(|given| samples(name, given)).transpose()
     };
-    let movement = movement(force_n, speed_mm_s)?;
+    let movement = Movement::partly(force_n, speed_mm_s).map_err(|why| why.raise())?;
     let (still, pdc) = (of("still", still)?, of("pdc", pdc)?);
     let (shear, pac) = (of("shear_mn", shear_mn)?, samples("pac", pac)?);
     work(py, move |_| {
@@ -197,7 +200,8 @@ fn features(
             movement,
             window: window_s,
             blocks: Vec::new(),
-            background,
+            // 0: it was not measured
+            background: background.or(still.is_none().then_some(0.0)),
             // a slide without it has none of its features
             pdc: pdc.unwrap_or_default(),
             pdc_rate_hz,

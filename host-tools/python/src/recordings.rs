@@ -290,7 +290,7 @@ impl Recordings {
 
     /// The features of all slides, as columns of a dict, a row for each slide: what `tactus features` prints.
     ///
-    /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it cannot be measured),
+    /// material, slide, trial (uint32), name (str), force_n, speed_mm_s, traction_n (NaN where it was not measured),
     /// roughness_ln, fineness_unfiltered_ln (float32), roughness_is_bound (bool), each of shape (slides,); ln_psd_bands
     /// of shape (slides, 8) and ln_fused_bands of shape (slides, 26), float32; pdc of shape (slides, 2), mean and
     /// standard deviation of P_DC (about the parabola that fits best), NaN where it was not measured; session and run
@@ -334,8 +334,11 @@ impl Recordings {
         columns.set_item("trial", array(py, trial_numbers))?;
         columns.set_item("roughness_is_bound", array(py, bounds.collect()))?;
         for (name, values) in [
-            ("force_n", of(|s| s.movement.force_n())),
-            ("speed_mm_s", of(|s| s.movement.speed_mm_s())),
+            ("force_n", of(|s| s.movement.known().0.unwrap_or(f32::NAN))),
+            (
+                "speed_mm_s",
+                of(|s| s.movement.known().1.unwrap_or(f32::NAN)),
+            ),
             ("traction_n", property(Property::Traction)),
             ("roughness_ln", property(Property::Roughness)),
             ("fineness_unfiltered_ln", property(Property::Fineness)),

@@ -189,7 +189,7 @@ impl Table {
         Ok(self.read()?.names().map(str::to_owned).collect())
     }
 
-    /// The movements: pairs of force (N) and speed (mm/s).
+    /// The movements: pairs of force (N) and speed (mm/s); 0 is unknown.
     #[getter]
     fn settings(&self) -> PyResult<Vec<(f32, f32)>> {
         let table = self.read()?;

@@ -162,7 +162,14 @@ impl Movement {
         self.force_mn
     }
 
-    /// Contact force in N.
+    /// Contact force in N and sliding speed in mm/s, as far as they are known.
+    pub fn known(self) -> (Option<f32>, Option<f32>) {
+        let force = (self.force_mn != 0).then(|| self.force_n());
+        let speed = (self.speed_um_s != 0).then(|| self.speed_mm_s());
+        (force, speed)
+    }
+
+    /// Contact force in N; 0 where it is unknown.
     pub fn force_n(self) -> f32 {
         f32::from(self.force_mn) * 1e-3
     }
@@ -172,7 +179,7 @@ impl Movement {
         self.speed_um_s
     }
 
-    /// Sliding speed in mm/s.
+    /// Sliding speed in mm/s; 0 where it is unknown.
     pub fn speed_mm_s(self) -> f32 {
         // at most 150 000: exact in f32
         self.speed_um_s as f32 * 1e-3
@@ -281,6 +288,7 @@ mod tests {
             let movement = Movement::partly(force_n, speed_mm_s).unwrap();
             assert_eq!(Movement::stored(stored.0, stored.1), Ok(movement));
             assert_eq!(movement.to_string(), text);
+            assert_eq!(movement.known(), (force_n, speed_mm_s));
             assert_eq!(movement.is_known(), stored.0 != 0 && stored.1 != 0);
         }
         assert_eq!(Movement::stored(9, 0), Err(MovementError::Force(9)));

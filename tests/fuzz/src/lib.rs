@@ -20,6 +20,7 @@ use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::store::{SelfLearnedRecord, Store};
 use tactus_core::table::{Change, Table, amend};
 use tactus_core::wire::{Command, Event, MAX_FRAME, Receiver, Report, Request};
+use tactus_lab::data::quality::SlideMarks;
 use tactus_lab::data::recordings::npy;
 use tactus_lab::eval::learn::know_lengths;
 use tactus_lab::eval::learned::note_learned;
@@ -429,8 +430,9 @@ pub fn seeds(target: &str) -> Vec<Vec<u8>> {
             };
             let tables = flash::tables();
             let noted = |table: &Vec<u8>| {
-                let slides = [[7; 6], [9; 6]];
-                note_learned(table, true, slides).expect("a table that notes two slides")
+                let slides = [[7; 6], [9; 6]].map(SlideMarks::from);
+                let slides: Vec<&SlideMarks> = slides.iter().collect();
+                note_learned(table, true, &slides).expect("a table that notes two slides")
             };
             let tables = tables.iter().cloned().chain(tables.iter().map(with_length));
             let tables = tables.chain(flash::tables().iter().map(noted));

@@ -68,7 +68,7 @@ impl<'s> SlideFeatures<'s> {
     fn of(texture: &'s Texture, slide: &MeasuredSlide, trial: usize, key: &'s SlideKey) -> Self {
         let measurement = &slide.measurement;
         let value = |property| measurement.properties.get(property);
-        let known = |value: f32| (value > 0.0).then_some(value);
+        let (force_n, speed_mm_s) = slide.movement.known();
         let bands = measurement.spectrum.fused_bands();
         let (pdc_mean, pdc_sd) = measurement.pdc.unzip();
         Self {
@@ -76,8 +76,8 @@ impl<'s> SlideFeatures<'s> {
             name: &texture.name,
             slide: slide.number,
             trial,
-            force_n: known(slide.movement.force_n()),
-            speed_mm_s: known(slide.movement.speed_mm_s()),
+            force_n,
+            speed_mm_s,
             traction_n: value(Property::Traction),
             roughness_ln: value(Property::Roughness),
             roughness_is_bound: measurement.roughness_is_bound,
@@ -237,9 +237,8 @@ fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> std::io::Resul
     let numbers: Vec<u8> = rows()
         .flat_map(|(_, slide, _)| slide.number.to_le_bytes())
         .collect();
-    let movement = |of: fn(Movement) -> f32| {
-        let known = |value: f32| if value > 0.0 { value } else { f32::NAN };
-        let values = rows().map(|(_, slide, _)| known(of(slide.movement)));
+    let movement = |of: fn(Movement) -> Option<f32>| {
+        let values = rows().map(|(_, slide, _)| of(slide.movement).unwrap_or(f32::NAN));
         floats(values.collect(), &[all])
     };
     let words = |of: fn(&SlideKey) -> &str| npy::words(rows().map(|(_, _, key)| of(key)));
@@ -256,8 +255,8 @@ fn arrays(set: &RecordingSet, measured: &[Vec<MeasuredSlide>]) -> std::io::Resul
         ("slides", npy::array("<u4", &[all], &numbers)),
         ("sessions", words(|key| &key.labels.session)),
         ("runs", words(|key| &key.labels.run)),
-        ("force_n", movement(Movement::force_n)),
-        ("speed_mm_s", movement(Movement::speed_mm_s)),
+        ("force_n", movement(|made| made.known().0)),
+        ("speed_mm_s", movement(|made| made.known().1)),
     ])
 }
 

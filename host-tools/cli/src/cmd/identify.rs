@@ -13,7 +13,7 @@ use tactus_core::explorer::{self, Config, Explorer};
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::{MAX_TEXTURES, Table};
-use tactus_lab::data::recording::Recording;
+use tactus_lab::data::quality::SlideMarks;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{Replay, ReplayError};
 use tactus_lab::eval::evaluate::Method;
@@ -164,7 +164,7 @@ fn identify_recorded(
     let mut left_out = None;
     let table = if let Some((file, table)) = given {
         of_one_finger(&set, table)?;
-        left_out = Some(LeftOut::of(table, &mut shown, Recording::hash));
+        left_out = Some(LeftOut::of(table, &mut shown, SlideMarks::of));
         ensure!(
             !shown.is_empty(),
             "{}: learned from every slide of {name} here; none is left to present",

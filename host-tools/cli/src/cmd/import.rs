@@ -63,6 +63,11 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
 
 /// A layout that says everything itself.
 fn known(args: &Args, to: &std::path::Path, out: &mut impl Write) -> anyhow::Result<()> {
+    ensure!(
+        args.settings == Settings::default() && args.like.is_none(),
+        "{}: these recordings say all themselves: leave out --finger, --rate and whatever else describes them",
+        args.from.display()
+    );
     let bar = progress(0, "importing slides");
     let imported = import::import(&args.from, to, &mut |done, all| {
         bar.set_length(all as u64);

@@ -137,10 +137,12 @@ fn command(file: &Path, args: &Args) -> String {
 fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<(Vec<Slides>, LeftOut)> {
     let (set, measured) = measure_folder(folder)?;
     of_one_finger(&set, table)?;
-    let mut out = LeftOut::of(table, &mut Vec::new(), |slide: &MeasuredSlide| slide.hash);
+    let mut out = LeftOut::of(table, &mut Vec::new(), |slide: &MeasuredSlide| {
+        slide.marks.clone()
+    });
     let textures = set.names().into_iter().zip(measured);
     let slides = textures.map(|(name, mut slides)| {
-        out.slides += LeftOut::of(table, &mut slides, |slide| slide.hash).slides;
+        out.slides += LeftOut::of(table, &mut slides, |slide| slide.marks.clone()).slides;
         Slides { name, slides }
     });
     Ok((slides.collect(), out))

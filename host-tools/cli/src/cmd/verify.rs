@@ -1,6 +1,5 @@
 //! `tactus verify`: whether slides are of one texture, whatever else they may be of.
 
-use std::collections::HashSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +7,8 @@ use anyhow::{Context as _, ensure};
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Answer, Config, Strategy};
 use tactus_core::features::{Movement, Observation, PropertySet};
-use tactus_core::table::{Action, POPULATION, SlideHash, Table};
+use tactus_core::table::{Action, POPULATION, Table};
+use tactus_lab::data::quality::SeenSlides;
 use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{MeasuredSlide, measure};
 use tactus_lab::eval::evaluate::{Method, explorer};
@@ -110,7 +110,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     };
     let table = Table::read(&bytes)?;
     of_one_finger(&set, table)?;
-    let left_out = LeftOut::of(table, &mut slides, |slide| slide.hash);
+    let left_out = LeftOut::of(table, &mut slides, |slide| slide.marks.clone());
     ensure!(
         left_out.slides == 0 || !slides.is_empty(),
         "{}: the table was learned from every slide of {sample_name} here; give others",
@@ -235,8 +235,8 @@ fn hold(
         verified.answer = name(now.answer);
         verified.slides.push(Slide {
             number: slide.number,
-            force_n: slide.movement.force_n(),
-            speed_mm_s: slide.movement.speed_mm_s(),
+            force_n: slide.movement.known().0,
+            speed_mm_s: slide.movement.known().1,
             score: now.score,
             limit: now.limit,
             answer: name(now.answer),
@@ -299,9 +299,9 @@ fn reference(
             .with_context(|| format!("{} with the reference", file.display()))?,
         None => {
             // the scale is not learned from what is held against it
-            let held: HashSet<SlideHash> = slides.iter().map(|slide| slide.hash).collect();
+            let held = SeenSlides::of(slides.iter().map(|slide| &slide.marks));
             for (texture, measured) in measured.iter_mut().enumerate() {
-                measured.retain(|slide| texture == index || !held.contains(&slide.hash));
+                measured.retain(|slide| texture == index || !held.has(&slide.marks));
             }
             let textures = measured.iter().filter(|slides| !slides.is_empty()).count();
             ensure!(

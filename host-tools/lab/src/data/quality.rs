@@ -1,9 +1,10 @@
 //! Checks of recorded samples before anything is learned from them: a sensor that is dead is no texture, and one piece
 //! of a recording is one slide.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use tactus_core::features::{Signal, SlideError};
+use tactus_core::table::SlideHash;
 
 use super::recording::{PAC_RATE_HZ, Recording};
 
@@ -111,6 +112,108 @@ impl Fingerprint {
             hashes = vec![(whole >> 32) as u32];
         }
         Self(hashes)
+    }
+}
+
+/// Marks of a slide that a table notes, most.
+const NOTED: usize = 8;
+/// Fewest marks by which a slide is taken for another.
+const FEWEST_NOTED: usize = 3;
+
+/// Marks by which a slide is known again in any folder: the hash of its P_AC, and those of some of its windows.
+#[derive(Clone, Debug)]
+pub struct SlideMarks {
+    hash: SlideHash,
+    print: Fingerprint,
+}
+
+impl From<SlideHash> for SlideMarks {
+    /// Marks of samples that are not at hand.
+    fn from(hash: SlideHash) -> Self {
+        let print = Fingerprint(Vec::new());
+        Self { hash, print }
+    }
+}
+
+impl SlideMarks {
+    /// Those of a slide.
+    pub fn of(slide: &Recording) -> Self {
+        Self {
+            hash: slide.hash(),
+            print: Fingerprint::of(slide),
+        }
+    }
+
+    /// The hash of the whole slide.
+    pub fn hash(&self) -> SlideHash {
+        self.hash
+    }
+
+    /// Marks as a table notes them beside hashes: three bytes of the slide's hash, and as many of a window's.
+    fn windows(&self) -> impl Iterator<Item = SlideHash> {
+        let [.., a, b, c] = self.hash;
+        let windows = self.print.0.iter().map(|hash| hash.to_le_bytes());
+        windows.map(move |[x, y, z, _]| [a, b, c, x, y, z])
+    }
+
+    /// The hashes that a table notes of slides, `most` at most: those of the slides, and as many of their windows for
+    /// each as there is room for.
+    pub fn noted(slides: &[&Self], most: usize) -> Vec<SlideHash> {
+        let each = (most / slides.len().max(1)).saturating_sub(1).min(NOTED);
+        let hashes = slides.iter().map(|slide| slide.hash);
+        let windows = slides.iter().flat_map(|slide| slide.windows().take(each));
+        hashes.chain(windows).collect()
+    }
+}
+
+/// Slides that are known again, shifted or not.
+#[derive(Debug, Default)]
+pub struct SeenSlides {
+    hashes: HashSet<SlideHash>,
+    /// by a window's mark, the slides that have it
+    windows: HashMap<[u8; 3], Vec<[u8; 3]>>,
+    /// marks of each slide
+    marks: HashMap<[u8; 3], usize>,
+}
+
+impl SeenSlides {
+    /// Those of which a table notes these hashes.
+    pub fn noted(hashes: &[SlideHash]) -> Self {
+        let mut seen = Self {
+            hashes: hashes.iter().copied().collect(),
+            ..Self::default()
+        };
+        for [a, b, c, x, y, z] in hashes {
+            let slide = [*a, *b, *c];
+            seen.windows.entry([*x, *y, *z]).or_default().push(slide);
+            *seen.marks.entry(slide).or_default() += 1;
+        }
+        seen
+    }
+
+    /// These, with all marks.
+    pub fn of<'m>(slides: impl IntoIterator<Item = &'m SlideMarks>) -> Self {
+        let marks =
+            |slide: &SlideMarks| std::iter::once(slide.hash).chain(slide.windows()).collect();
+        let all: Vec<Vec<SlideHash>> = slides.into_iter().map(marks).collect();
+        Self::noted(&all.concat())
+    }
+
+    /// True if a slide is one of them, or shares more than a third of its samples, or of theirs, with one.
+    pub fn has(&self, slide: &SlideMarks) -> bool {
+        if self.hashes.contains(&slide.hash) {
+            return true;
+        }
+        let mut of: HashMap<[u8; 3], usize> = HashMap::new();
+        for [.., x, y, z] in slide.windows() {
+            for seen in self.windows.get(&[x, y, z]).into_iter().flatten() {
+                *of.entry(*seen).or_default() += 1;
+            }
+        }
+        of.iter().any(|(seen, shared)| {
+            let marks = self.marks.get(seen).copied().unwrap_or(0);
+            *shared >= FEWEST_NOTED && shared * SHARED > marks.min(slide.print.0.len())
+        })
     }
 }
 

@@ -17,12 +17,15 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use tactus_core::features::Movement;
-use tactus_core::sensor::FingerCode;
-use tactus_core::table::Table;
+use tactus_core::sensor::{FingerCode, FingerName};
+use tactus_core::table::{Table, valid_name};
 
 use crate::data::recording::{Labels, Recording, SlideKey, Texture};
 pub use files::{RecordingError, Result, read_bounded};
 pub use writer::{RecordingWriter, files as files_of};
+
+/// The beginning of names that are kept for this project's fingers.
+const OURS: &str = "tactus-";
 
 /// The sensor of recordings or of a table.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -42,6 +45,28 @@ impl Sensor {
             name: labels.sensor.clone(),
             calibrated: labels.calibrated,
         }
+    }
+
+    /// The finger of this name, and the name where it is the sensor of somebody else; an empty one is a BioTac.
+    /// Errors: it is no name, or one that is kept for this project's fingers.
+    pub fn named(name: &str) -> std::result::Result<(FingerCode, String), String> {
+        if name.is_empty() {
+            return Ok((FingerCode::BIOTAC, String::new()));
+        }
+        match name.parse() {
+            Ok(FingerCode::OTHER) | Err(_) => {}
+            Ok(finger) => return Ok((finger, String::new())),
+        }
+        let begins = name.get(..OURS.len());
+        if begins.is_some_and(|begin| begin.eq_ignore_ascii_case(OURS)) {
+            let ours = FingerName::ALL.map(FingerName::as_str).join(", ");
+            return Err(format!(
+                "{name:?} is no finger of this project, whose names begin with {OURS}: give one of {ours}, or another \
+                 name"
+            ));
+        }
+        valid_name(name).map_err(|why| format!("{name:?} {why}"))?;
+        Ok((FingerCode::OTHER, name.to_owned()))
     }
 
     /// That slides of this sensor can be compared with a table.

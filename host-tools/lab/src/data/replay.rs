@@ -12,7 +12,7 @@ use tactus_core::features::{
 use tactus_core::rig::Rig;
 use tactus_core::table::SlideHash;
 
-use crate::data::quality::{DuplicateSearch, Fingerprint, check};
+use crate::data::quality::{DuplicateSearch, Fingerprint, SlideMarks, check};
 use crate::data::recording::{Labels, Recording, Texture};
 use crate::data::recordings::files::each_in_flight;
 use crate::data::recordings::{RecordingError, RecordingSet};
@@ -34,8 +34,8 @@ pub struct MeasuredSlide {
     pub movement: Movement,
     /// The core's measurement.
     pub measurement: Measurement,
-    /// Its samples' hash: see [`Recording::hash`].
-    pub hash: SlideHash,
+    /// By which its samples are known again.
+    pub marks: SlideMarks,
     /// Session and run, as [`Labels`] have them; empty if unknown.
     pub session: [String; 2],
     /// Features of one's own, where these count in place of the measurement's.
@@ -50,7 +50,7 @@ impl MeasuredSlide {
             number: slide.number,
             movement: slide.movement,
             measurement: measure(plan, slide)?,
-            hash: slide.hash(),
+            marks: SlideMarks::of(slide),
             session: [labels.session.clone(), labels.run.clone()],
             given: None,
         })
@@ -75,7 +75,7 @@ impl MeasuredSlide {
                 background: 0.0,
                 spectrum: Spectrum::new(0, [0.0; BINS], [0.0; FUSED_BANDS]),
             },
-            hash,
+            marks: hash.into(),
             session: [session, String::new()],
             given: Some(features),
         }

@@ -156,5 +156,6 @@ pub fn learn_first(
     let sensor = set.sensor()?;
     let named = name_finger(&noted, sensor.finger, sensor.calibrated, &sensor.name)?;
     let used = first.iter().flatten().flatten();
-    Ok(note_learned(&named, true, used.map(|slide| slide.hash))?)
+    let used: Vec<_> = used.map(|slide| &slide.marks).collect();
+    Ok(note_learned(&named, true, &used)?)
 }

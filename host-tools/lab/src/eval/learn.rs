@@ -14,7 +14,7 @@ use tactus_link::for_probe;
 
 use super::basis::{best_features, length};
 use super::calibrate::limits;
-use super::learned::note_learned;
+use super::learned;
 use super::pace;
 
 /// Three sections, whose lengths are numbers of 16 bits.
@@ -119,7 +119,7 @@ pub fn name_finger(
 /// Errors: A table is invalid, or not of the same textures and movements.
 pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec<u8>, EncodeError> {
     let noted = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    let learned = noted.learned_slides();
+    let slides = noted.learned_slides();
     let bare = for_probe(&noted);
     let table = Table::read(&bare).map_err(EncodeError::Invalid)?;
     let shorter = shorter.iter().map(|(ms, table, movements)| {
@@ -137,7 +137,7 @@ pub fn know_lengths(bytes: &[u8], shorter: &[(u16, Vec<u8>, u64)]) -> Result<Vec
     let length = with_lengths(&mut out, &table, &shorter)?.as_bytes().len();
     out.truncate(length);
     match bare.len() < bytes.len() {
-        true => note_learned(&out, learned.all, learned.hashes.iter().copied()),
+        true => learned::write(&out, slides),
         false => Ok(out),
     }
 }

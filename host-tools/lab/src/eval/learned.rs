@@ -3,6 +3,7 @@
 use serde::Serialize;
 use tactus_core::table::{EncodeError, LearnedSlides, MAX_LEARNED, SlideHash, Table, with_learned};
 
+use crate::data::quality::{SeenSlides, SlideMarks};
 use crate::eval::show::count;
 
 /// Slides that a test of a table left out.
@@ -17,11 +18,12 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
-    /// Leaves the slides out that the table was learned from.
-    pub fn of<T>(table: Table<'_>, slides: &mut Vec<T>, hash: impl Fn(&T) -> SlideHash) -> Self {
+    /// Leaves the slides out that the table was learned from, shifted or not.
+    pub fn of<T>(table: Table<'_>, slides: &mut Vec<T>, marks: impl Fn(&T) -> SlideMarks) -> Self {
         let learned = table.learned_slides();
+        let seen = SeenSlides::noted(learned.hashes);
         let before = slides.len();
-        slides.retain(|slide| !learned.has(&hash(slide)));
+        slides.retain(|slide| !seen.has(&marks(slide)));
         Self {
             slides: before - slides.len(),
             all_known: learned.all,
@@ -51,19 +53,33 @@ impl LeftOut {
 pub fn note_learned(
     bytes: &[u8],
     all: bool,
-    slides: impl IntoIterator<Item = SlideHash>,
+    slides: &[&SlideMarks],
 ) -> Result<Vec<u8>, EncodeError> {
     let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
-    let there = table.learned_slides().hashes.iter().copied();
-    let mut hashes: Vec<SlideHash> = there.chain(slides).collect();
+    let there = table.learned_slides().hashes;
+    let mut hashes = SlideMarks::noted(slides, MAX_LEARNED.saturating_sub(there.len()));
+    hashes.extend(there);
     hashes.sort_unstable();
     hashes.dedup();
     let all = all && hashes.len() <= MAX_LEARNED;
     hashes.truncate(MAX_LEARNED);
-    let hashes = hashes.as_slice();
+    write(
+        bytes,
+        LearnedSlides {
+            all,
+            hashes: &hashes,
+        },
+    )
+}
+
+/// The table with this note in place of its own.
+pub(super) fn write(bytes: &[u8], learned: LearnedSlides<'_>) -> Result<Vec<u8>, EncodeError> {
+    let table = Table::read(bytes).map_err(EncodeError::Invalid)?;
+    let hashes: &[SlideHash] = learned.hashes;
     let mut noted = vec![0; bytes.len() + 8 + hashes.as_flattened().len()];
-    let learned = Some(LearnedSlides { all, hashes });
-    let length = with_learned(&mut noted, &table, learned)?.as_bytes().len();
+    let length = with_learned(&mut noted, &table, Some(learned))?
+        .as_bytes()
+        .len();
     noted.truncate(length);
     Ok(noted)
 }

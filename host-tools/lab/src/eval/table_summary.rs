@@ -36,8 +36,8 @@ pub struct TableSummary {
 /// A movement of a table.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MovementSummary {
-    force_n: f32,
-    speed_mm_s: f32,
+    force_n: Option<f32>,
+    speed_mm_s: Option<f32>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -89,8 +89,8 @@ impl TableSummary {
             movements: table
                 .movements()
                 .map(|movement| MovementSummary {
-                    force_n: movement.force_n(),
-                    speed_mm_s: movement.speed_mm_s(),
+                    force_n: movement.known().0,
+                    speed_mm_s: movement.known().1,
                 })
                 .collect(),
             textures: (0..table.textures())

@@ -169,8 +169,8 @@ impl SlideRecord {
         let movement = table.movement(action.movement);
         let chosen = expected.iter().find(|o| o.action == action);
         Self {
-            force_n: movement.map(|movement| movement.force_n()),
-            speed_mm_s: movement.map(|movement| movement.speed_mm_s()),
+            force_n: movement.and_then(|movement| movement.known().0),
+            speed_mm_s: movement.and_then(|movement| movement.known().1),
             property: action.property.map(Property::name),
             expected_uncertainty: chosen.map(|chosen| chosen.uncertainty),
             traction_n: None,

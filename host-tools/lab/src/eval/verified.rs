@@ -70,9 +70,9 @@ pub struct Slide {
     /// From 1.
     pub number: u32,
     /// Contact force, N.
-    pub force_n: f32,
+    pub force_n: Option<f32>,
     /// mm/s.
-    pub speed_mm_s: f32,
+    pub speed_mm_s: Option<f32>,
     /// Difference of the slides from the reference.
     pub score: f32,
     /// Above it they are different.
@@ -97,10 +97,16 @@ pub fn print_slide(slide: &Slide, out: &mut impl Write) -> io::Result<()> {
         "different" => "different",
         _ => "not sure yet",
     };
+    let force = slide.force_n.map(|n| format!(", {n:.2} N"));
+    let speed = slide.speed_mm_s.map(|v| format!(" at {v:.1} mm/s"));
     writeln!(
         out,
-        "  slide {}, {:.2} N at {:.1} mm/s: score {:.1}, different above {:.1}: {says}",
-        slide.number, slide.force_n, slide.speed_mm_s, slide.score, slide.limit
+        "  slide {}{}{}: score {:.1}, different above {:.1}: {says}",
+        slide.number,
+        force.unwrap_or_default(),
+        speed.unwrap_or_default(),
+        slide.score,
+        slide.limit
     )
 }
 

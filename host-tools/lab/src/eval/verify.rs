@@ -297,11 +297,8 @@ pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec
     let length = amend(&mut bytes, &table, change)?.as_bytes().len();
     bytes.truncate(length);
     let all = table.learned_slides().all;
-    Ok(note_learned(
-        &bytes,
-        all,
-        slides.iter().map(|slide| slide.hash),
-    )?)
+    let slides: Vec<_> = slides.iter().map(|slide| &slide.marks).collect();
+    Ok(note_learned(&bytes, all, &slides)?)
 }
 
 const MOST_OF_ONE: usize = 4096;

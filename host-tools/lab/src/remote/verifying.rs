@@ -62,8 +62,8 @@ impl<'t> Verifying<'t> {
             Event::Verified { slides, now, .. } => {
                 let slide = Slide {
                     number: u32::from(*slides),
-                    force_n: self.movement.map_or(0.0, Movement::force_n),
-                    speed_mm_s: self.movement.map_or(0.0, Movement::speed_mm_s),
+                    force_n: self.movement.and_then(|made| made.known().0),
+                    speed_mm_s: self.movement.and_then(|made| made.known().1),
                     score: now.score,
                     limit: now.limit,
                     answer: name(now.answer),

@@ -66,14 +66,14 @@ def features(
     pac: _Samples,
     *,
     window_s: Tuple[float, float],
-    force_n: float,
-    speed_mm_s: float,
+    force_n: Optional[float] = None,
+    speed_mm_s: Optional[float] = None,
     still: Optional[_Samples] = None,
     background: Optional[float] = None,
     shear_mn: Optional[_Samples] = None,
-    shear_rate_hz: int = 100,
+    shear_rate_hz: float = 100.0,
     pdc: Optional[_Samples] = None,
-    pdc_rate_hz: int = 100,
+    pdc_rate_hz: float = 100.0,
 ) -> Features: ...
 
 class Slide:
@@ -100,11 +100,11 @@ class Slide:
     @property
     def pdc(self) -> NDArray[np.int16]: ...
     @property
-    def pdc_rate_hz(self) -> int: ...
+    def pdc_rate_hz(self) -> float: ...
     @property
     def shear_mn(self) -> Optional[NDArray[np.int16]]: ...
     @property
-    def shear_rate_hz(self) -> int: ...
+    def shear_rate_hz(self) -> float: ...
     def features(self) -> Features: ...
 
 def features_of(slides: Sequence[Slide]) -> List[Features]: ...

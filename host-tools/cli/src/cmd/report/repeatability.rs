@@ -26,8 +26,8 @@ struct Gauged {
 
 #[derive(Serialize)]
 struct AtMovement {
-    force_n: f32,
-    speed_mm_s: f32,
+    force_n: Option<f32>,
+    speed_mm_s: Option<f32>,
     #[serde(skip)]
     movement: Movement,
     properties: Vec<Gauge>,
@@ -164,8 +164,8 @@ fn gauge(slides: &[Taken]) -> anyhow::Result<Gauged> {
             });
         }
         movements.push(AtMovement {
-            force_n: movement.force_n(),
-            speed_mm_s: movement.speed_mm_s(),
+            force_n: movement.known().0,
+            speed_mm_s: movement.known().1,
             movement,
             properties,
         });

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tactus_core::features::Movement;
-use tactus_core::sensor::FingerCode;
 
 use super::cut::Parts;
 use super::resample::RATES_HZ;
@@ -15,7 +14,7 @@ use super::settings::{Named, SETTINGS, Settings};
 use super::signals::Signals;
 use crate::data::quality::{DuplicateSearch, Fingerprint, check};
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
-use crate::data::recordings::files::each_in_flight;
+use crate::data::recordings::files::{confined, each_in_flight};
 use crate::data::recordings::{RecordingError, RecordingWriter, Result};
 
 mod columns;
@@ -183,13 +182,17 @@ impl Survey {
         settings: Settings,
         progress: &(dyn Fn(usize, usize) + Sync),
     ) -> Result<Self> {
-        let (from, settings) = known_layout(from, settings);
+        let whole = from;
+        let (from, settings) = known_layout(whole, settings);
+        confined(folder_of(whole), &from)?;
         let settings = settings.with_file(folder_of(&from))?;
         settings
             .check()
             .map_err(|why| RecordingError::at(&from, why))?;
-        let paths = files(&from, &settings)?;
-        Self::look(Source::Files(from), &paths, settings, progress)
+        let (paths, skipped) = files(&from, &settings)?;
+        let mut survey = Self::look(Source::Files(from), &paths, settings, progress)?;
+        survey.left_out.extend(skipped);
+        Ok(survey)
     }
 
     fn look(
@@ -384,15 +387,13 @@ impl Survey {
     }
 
     fn labels(&self, found: &Found) -> Labels {
+        // it was checked before
+        let (finger, sensor) = self.settings.sensor().unwrap_or_default();
         Labels {
             session: found.session.clone(),
             run: found.run.clone(),
-            finger: FingerCode::OTHER,
-            sensor: self
-                .settings
-                .finger
-                .clone()
-                .unwrap_or_else(|| "my-sensor".to_owned()),
+            finger,
+            sensor,
             ..Labels::default()
         }
     }

@@ -4,9 +4,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use tactus_core::sensor::FingerCode;
+
 use super::signals::Signals;
 use crate::data::recordings::files::confined;
-use crate::data::recordings::{RecordingError, Result, read_bounded};
+use crate::data::recordings::{RecordingError, Result, Sensor, read_bounded};
 
 /// Name of the file of settings in the folder of the data.
 pub const SETTINGS: &str = "import.toml";
@@ -122,7 +124,7 @@ impl Settings {
     /// Errors: The file is none of settings.
     pub fn with_file(self, folder: &Path) -> Result<Self> {
         let path = folder.join(SETTINGS);
-        if !path.is_file() {
+        if path.symlink_metadata().is_err() {
             return Ok(self);
         }
         confined(folder, &path)?;
@@ -186,8 +188,17 @@ impl Settings {
         head.to_owned() + &lines.collect::<String>()
     }
 
+    /// The finger, and the sensor's name.
+    /// Errors: as [`Sensor::named`].
+    pub(super) fn sensor(&self) -> std::result::Result<(FingerCode, String), String> {
+        let name = self.finger.as_deref().map(str::trim);
+        let name = name.filter(|name| !name.is_empty()).unwrap_or("my-sensor");
+        Sensor::named(name).map_err(|why| format!("finger {why}"))
+    }
+
     /// Refuses what no file can be read with.
     pub(super) fn check(&self) -> std::result::Result<(), String> {
+        self.sensor()?;
         if self.texture.as_ref().is_some_and(|t| t.len() > MAX_PATTERN) {
             return Err(format!(
                 "--texture has more than {MAX_PATTERN} bytes; give a column, or a shorter pattern"

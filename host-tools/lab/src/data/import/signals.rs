@@ -61,21 +61,46 @@ pub struct Piece {
     pub run: Option<String>,
 }
 
-/// Beginnings of files that are not read, and a remedy.
-const OTHERS: [(&[u8], &str); 9] = [
-    (b"PAR1", "parquet; save it as CSV, see own-data.md"),
-    (b"fLaC", "FLAC; unpack it by `flac -d`"),
-    (b"OggS", "Ogg, which loses vibration; record WAV"),
-    (b"ID3", "MP3, which loses vibration; record WAV"),
-    (b"FORM", "AIFF; save it as WAV"),
-    (b"\x89HDF", "HDF5; save its arrays by numpy.save"),
+/// Files of data that are not read: how they begin, how their names end, and a remedy.
+const OTHERS: [(&[u8], &[&str], &str); 9] = [
+    (b"PAR1", &["parquet"], PARQUET),
+    (b"fLaC", &["flac"], "FLAC; unpack it by `flac -d`"),
+    (
+        b"OggS",
+        &["ogg", "opus"],
+        "Ogg, which loses vibration; record WAV",
+    ),
+    (b"ID3", &["mp3"], "MP3, which loses vibration; record WAV"),
+    (b"FORM", &["aif", "aiff"], "AIFF; save it as WAV"),
+    (
+        b"\x89HDF",
+        &["h5", "hdf5"],
+        "HDF5; save its arrays by numpy.save",
+    ),
     (
         b"MATLAB",
+        &["mat"],
         "MATLAB; save its arrays by writematrix or numpy.save",
     ),
-    (b"%PDF", "PDF; save the numbers as CSV"),
-    (b"\xd0\xcf\x11\xe0", "an old spreadsheet; save it as CSV"),
+    (b"%PDF", &[], "PDF; save the numbers as CSV"),
+    (
+        b"\xd0\xcf\x11\xe0",
+        &["xls", "xlsx", "ods"],
+        "a spreadsheet; save it as CSV",
+    ),
 ];
+
+/// Pandas has a reader of its own, and no crate of less than twenty others reads what it writes.
+const PARQUET: &str = "parquet, which is not read; these two lines of Python make CSV of all below this folder:\n\
+                       import glob, pandas\n\
+                       for f in glob.glob(\"**/*.parquet\", recursive=True): \
+                       pandas.read_parquet(f).to_csv(f[:-7] + \"csv\", index=False)";
+
+/// The remedy for files whose names end so, which are data but not read.
+pub(super) fn not_read(end: &str) -> Option<&'static str> {
+    let mut others = OTHERS.iter();
+    others.find_map(|(_, ends, what)| ends.contains(&end).then_some(*what))
+}
 
 impl Signals {
     /// Reads a file of any of the kinds.
@@ -105,7 +130,7 @@ impl Signals {
     }
 
     fn unpacked(bytes: &[u8], most: usize) -> std::result::Result<Self, String> {
-        if let Some((_, what)) = OTHERS.iter().find(|(begin, _)| bytes.starts_with(begin)) {
+        if let Some((.., what)) = OTHERS.iter().find(|(begin, ..)| bytes.starts_with(begin)) {
             return Err(format!("a file of {what}"));
         }
         let read = match bytes {

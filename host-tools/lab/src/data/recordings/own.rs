@@ -6,9 +6,9 @@
 //! | `name` | name of the texture, without spaces around it |
 //! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
 //! | `texture` | number of the texture; the same number always has the same name; empty: the next that is free |
-//! | `slide` | number of the slide of its texture, in the order of time, each once; empty: the one after the row before |
+//! | `slide` | number of the slide of its texture, in the order of time, each once; empty: one more than the last |
 //! | `force_n`, `speed_mm_s` | the movement: contact force in N, sliding speed in mm/s; empty if unknown |
-//! | `window_start_s`, `window_end_s` | the steady part, in s from the start of the record; empty for its start and end |
+//! | `window_start_s`, `window_end_s` | the steady part, in s from the record's start; empty for its start and end |
 //! | `background_power` | power of P_AC without texture after the band-pass, in counts^2; empty if not measured |
 //! | `background_file`, `background_sha256` | P_AC of the finger at rest, like `pac_file`; empty if not measured |
 //! | `pdc_file`, `pdc_rate_hz`, `pdc_sha256` | P_DC in counts about the still baseline; empty if not measured |
@@ -16,7 +16,7 @@
 //! | `lot`, `operator`, `note` | batch or piece, operator, remark |
 //! | `moved` | sample moved or turned since the slide before: `yes`, `no`, or empty if unknown |
 //! | `session`, `run` | session, and run of the machine in it |
-//! | `finger` | the finger: `biotac`, `analog`, `mems`, or the name of another sensor; empty for a BioTac |
+//! | `finger` | `biotac`, `analog`, `mems`, or another sensor's name, not `tactus-...`; empty for a BioTac |
 //! | `highest_hz` | highest frequency that the sensor measures, Hz; empty for 1100 |
 //! | `calibrated` | day of the force calibration, as 20261121; 1: day unknown; 0 or empty: none, or unknown |
 //! | `pace` | ln(mean speed / `speed_mm_s`) in 1/1024, by a sensor of motion; empty if not measured |
@@ -39,17 +39,14 @@ use std::collections::hash_map::Entry as Place;
 use std::path::Path;
 use std::str::FromStr;
 
-use tactus_core::features::Movement;
-use tactus_core::sensor::FingerCode;
-use tactus_core::table::valid_name;
-
 use super::files::{
     OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash, distinct_textures,
     in_order_of_time, inside, read_named,
 };
-use super::npy;
+use super::{Sensor, npy};
 use crate::data::recording::{LEAVE_OUT, Labels, PAC_RATE_HZ, Recording, SlideKey, Texture};
 use crate::data::rows::{Row, Rows};
+use tactus_core::features::Movement;
 
 /// Its columns, in the order in which they are written.
 pub const COLUMNS: [&str; 19] = [
@@ -346,14 +343,8 @@ impl Entry {
 fn labels(row: &Row<'_>) -> Result<Labels> {
     let [lot, operator, note, session, run] = ["lot", "operator", "note", "session", "run"]
         .map(|column| row.shown(column).map(str::to_owned));
-    let finger = row.text("finger");
-    let code = match finger {
-        "" => FingerCode::BIOTAC,
-        name => name.parse().unwrap_or(FingerCode::OTHER),
-    };
-    if code == FingerCode::OTHER {
-        valid_name(finger).map_err(|why| row.error(Some("finger"), why))?;
-    }
+    let (finger, sensor) =
+        Sensor::named(row.text("finger")).map_err(|why| row.error(Some("finger"), why))?;
     let moved = match row.text("moved") {
         "" => None,
         "yes" => Some(true),
@@ -371,12 +362,8 @@ fn labels(row: &Row<'_>) -> Result<Labels> {
         moved,
         session: session?,
         run: run?,
-        sensor: if code == FingerCode::OTHER {
-            finger.to_owned()
-        } else {
-            String::new()
-        },
-        finger: code,
+        sensor,
+        finger,
         calibrated: match row.text("calibrated") {
             "" => 0,
             _ => row.parse("calibrated", "a day as 20261121")?,

@@ -12,14 +12,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use tactus_core::sensor::FingerCode;
-use tactus_core::table::valid_name;
 
 use super::files::{
     BIOTAC_MANIFEST, INCOMPLETE, OWN_MANIFEST as MANIFEST, RecordingError, Result, check_hash,
     check_text, distinct_textures, inside, open, read_bounded, sha256,
 };
-use super::npy;
 use super::own::{COLUMNS, LABELS, VERSION};
+use super::{Sensor, npy};
 use crate::data::program::program;
 use crate::data::recording::{Labels, PAC_RATE_HZ, Recording, Texture};
 use crate::data::whole::{Lock, NewOutputs, sync_folder};
@@ -156,9 +155,8 @@ impl RecordingWriter {
         check(texture, slide, &manifest)?;
         let labels = &self.labels;
         if labels.finger == FingerCode::OTHER {
-            valid_name(&labels.sensor).map_err(|why| {
-                RecordingError::at(&manifest, format!("sensor {:?} {why}", labels.sensor))
-            })?;
+            Sensor::named(&labels.sensor)
+                .map_err(|why| RecordingError::at(&manifest, format!("sensor {why}")))?;
         }
         let texts = [
             &labels.lot,

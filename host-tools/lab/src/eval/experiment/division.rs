@@ -3,9 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use tactus_core::features::{Movement, Observation};
-use tactus_core::table::SlideHash;
 
 use super::{ExperimentError, Pool, Protocol};
+use crate::data::quality::SeenSlides;
 use crate::data::replay::MeasuredSlide;
 
 /// Slides of a session that [`Protocol::Blocked`] trains from, out of [`SESSION`].
@@ -21,7 +21,7 @@ pub(super) struct Division<'s> {
     /// Those of a second folder, per texture.
     test: Option<Vec<&'s [MeasuredSlide]>>,
     /// Slides that are learned from, where a second folder brings the test slides.
-    learned: HashSet<SlideHash>,
+    learned: SeenSlides,
     protocol: Protocol,
     /// Session and run of each part that is tested in turn; none where nothing is.
     pub(super) parts: Vec<[String; 2]>,
@@ -65,7 +65,7 @@ impl<'s> Division<'s> {
             numbers: parts.iter().cloned().zip(0..).collect(),
             observed,
             test: test.transpose()?,
-            learned: HashSet::new(),
+            learned: SeenSlides::default(),
             protocol,
             parts,
         };
@@ -76,7 +76,7 @@ impl<'s> Division<'s> {
             )));
         }
         if division.test.is_some() {
-            let mut learned = HashSet::new();
+            let mut learned = Vec::new();
             for (texture, slides) in observed.iter().enumerate() {
                 let movements: HashSet<Movement> = slides.iter().map(|s| s.movement).collect();
                 for movement in movements {
@@ -85,10 +85,10 @@ impl<'s> Division<'s> {
                         Protocol::Drift => train_slides,
                         _ => train.len(),
                     };
-                    learned.extend(train.iter().take(first).map(|slide| slide.hash));
+                    learned.extend(train.iter().take(first).map(|slide| &slide.marks));
                 }
             }
-            division.learned = learned;
+            division.learned = SeenSlides::of(learned);
         }
         Ok(division)
     }
@@ -113,7 +113,7 @@ impl<'s> Division<'s> {
         }
         let there = test.as_ref().map_or(0, Vec::len);
         if let Some(test) = &mut test {
-            test.retain(|slide| !self.learned.contains(&slide.hash));
+            test.retain(|slide| !self.learned.has(&slide.marks));
         }
         let left_out = there - test.as_ref().map_or(0, Vec::len);
         let part = |slide: &&MeasuredSlide| {

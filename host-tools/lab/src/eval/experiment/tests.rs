@@ -28,7 +28,7 @@ fn slides(of: &[&[(usize, u32, u32, u32)]]) -> (Vec<String>, Vec<Vec<MeasuredSli
                 slide.number = number;
                 slide.movement = movements[*movement];
                 slide.measurement.properties = Properties::new(mark);
-                slide.hash = [0, 0, 0, 0, (number >> 8) as u8, number as u8];
+                slide.marks = [0, 0, 0, 0, (number >> 8) as u8, number as u8].into();
                 slide.session = [session, run].map(|n| {
                     if *n == 0 {
                         String::new()

@@ -75,6 +75,7 @@ impl Survey {
     /// Looks at signals in memory, of which the settings say the rate; those shorter than a slide are left out.
     /// Errors: as [`Survey::of`]; a texture has none that is long enough.
     pub fn of_memory(all: Vec<InMemory>, settings: Settings) -> Result<Self> {
+        settings.check().map_err(RecordingError::said)?;
         let short = too_short(&all, &settings);
         let paths = (0..).zip(&all).filter(|(at, _)| !short.contains_key(at));
         let paths: Vec<_> = paths.map(|(at, one)| (name(at), named(one))).collect();

@@ -6,24 +6,46 @@ use std::path::{Path, PathBuf};
 use super::columns::{no_channel, time};
 use crate::data::import::on_line;
 use crate::data::import::settings::{Named, Settings, guessed, matched};
-use crate::data::import::signals::Signals;
+use crate::data::import::signals::{Signals, not_read};
+use crate::data::recordings::files::confined;
 use crate::data::recordings::{RecordingError, Result};
 
 /// Deepest folder below the one that is imported.
 const DEPTH: usize = 8;
+/// Most that an error names of what is left out.
+const NAMED: usize = 8;
 /// Most files of one import.
 const MOST_FILES: usize = 100_000;
-/// Endings of files that are data; others are left alone.
+/// Endings of files that are read. Those of data that is not read are named; all others are left alone.
 const ENDINGS: [&str; 11] = [
     "wav", "wave", "csv", "tsv", "txt", "dat", "log", "lvm", "npy", "npz", "mcap",
 ];
 
-/// The files to import, by their paths below the folder, and what these say, in their natural order.
-pub(super) fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Named)>> {
-    let mut paths = Vec::new();
+/// Paths of files, and what these say.
+pub(super) type Paths = Vec<(String, Named)>;
+
+/// What is found below a folder.
+#[derive(Default)]
+struct Below {
+    /// paths of files
+    paths: Vec<String>,
+    /// what is not read, and why
+    skipped: Vec<String>,
+}
+
+/// The files to import, by their paths below the folder, and what these say, in their natural order; and what is not
+/// read there, and why.
+pub(super) fn files(from: &Path, settings: &Settings) -> Result<(Paths, Vec<String>)> {
+    let mut below = Below::default();
     if from.is_dir() {
-        walk(from, "", 0, &mut paths)?;
-    } else {
+        walk(from, "", 0, &mut below)?;
+    }
+    let Below {
+        mut paths,
+        mut skipped,
+    } = below;
+    skipped.sort();
+    if !from.is_dir() {
         let name = from
             .file_name()
             .map(|name| name.to_string_lossy().into_owned());
@@ -44,13 +66,19 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<Vec<(String, Nam
     });
     let named: Vec<_> = named.collect();
     if named.is_empty() {
-        let why = match pattern {
+        let mut why = match pattern {
             Some(pattern) => format!("no path in it is like {pattern:?}"),
             None => format!("no file in it ends with {}", ENDINGS.join(", ")),
         };
+        let more = skipped.len().saturating_sub(NAMED);
+        skipped.truncate(NAMED);
+        skipped.extend((more > 0).then(|| format!("{more} more")));
+        for skipped in skipped {
+            why += &format!("; left out: {skipped}");
+        }
         return Err(RecordingError::at(from, why));
     }
-    Ok(named)
+    Ok((named, skipped))
 }
 
 /// The folder of accelerations in the Cluster Haptic Texture Dataset (Eguchi et al., arXiv 2407.16206), as CSV:
@@ -104,8 +132,11 @@ pub(super) const BESIDE: &str = "force";
 
 /// Adds the column of the file beside one that belongs to it, at its times.
 pub(super) fn add(signals: &mut Signals, beside: &Path, settings: &Settings) -> Result<()> {
-    if signals.channel(BESIDE).is_some() || !beside.is_file() {
+    if signals.channel(BESIDE).is_some() || beside.symlink_metadata().is_err() {
         return Ok(());
+    }
+    if let Some(folder) = beside.parent() {
+        confined(folder, beside)?;
     }
     let other = Signals::read(beside)?;
     let at = |why: String| RecordingError::at(beside, why);
@@ -126,7 +157,7 @@ pub(super) fn add(signals: &mut Signals, beside: &Path, settings: &Settings) -> 
     Ok(())
 }
 
-fn walk(folder: &Path, below: &str, depth: usize, paths: &mut Vec<String>) -> Result<()> {
+fn walk(folder: &Path, above: &str, depth: usize, below: &mut Below) -> Result<()> {
     let fault = |why: std::io::Error| RecordingError::at(folder, why);
     for entry in fs::read_dir(folder).map_err(fault)? {
         let entry = entry.map_err(fault)?;
@@ -134,21 +165,33 @@ fn walk(folder: &Path, below: &str, depth: usize, paths: &mut Vec<String>) -> Re
         if name.starts_with('.') {
             continue;
         }
-        let path = format!("{below}{name}");
-        // of the entry itself: links that lead elsewhere are left alone
+        let path = format!("{above}{name}");
+        let plain = name.strip_suffix(".gz").unwrap_or(&name).to_lowercase();
+        let end = plain.rsplit_once('.').map_or("", |(_, end)| end);
+        // of the entry itself: what a link leads to is not looked at
         let kind = entry.file_type().map_err(fault)?;
-        if kind.is_dir() && depth < DEPTH {
-            walk(&entry.path(), &format!("{path}/"), depth + 1, paths)?;
-        } else if kind.is_file() {
-            let plain = name.strip_suffix(".gz").unwrap_or(&name).to_lowercase();
-            if plain
-                .rsplit_once('.')
-                .is_some_and(|(_, end)| ENDINGS.contains(&end))
-            {
-                paths.push(path);
+        let why = if kind.is_dir() {
+            if depth < DEPTH {
+                walk(&entry.path(), &format!("{path}/"), depth + 1, below)?;
+                continue;
             }
-        }
-        if paths.len() > MOST_FILES {
+            Some(format!(
+                "a folder deeper than {DEPTH}; import the one that it is in"
+            ))
+        } else if kind.is_symlink() {
+            Some("a symbolic link, which is not followed; put the file itself here".to_owned())
+        } else if !kind.is_file() {
+            Some("a pipe, socket or device, which is not opened; put a file here".to_owned())
+        } else if ENDINGS.contains(&end) {
+            below.paths.push(path);
+            continue;
+        } else {
+            not_read(end).map(|what| format!("a file of {what}"))
+        };
+        below
+            .skipped
+            .extend(why.map(|why| format!("{path}: {why}")));
+        if below.paths.len().max(below.skipped.len()) > MOST_FILES {
             return Err(RecordingError::at(
                 folder,
                 format!("more than {MOST_FILES} files; import a part"),
