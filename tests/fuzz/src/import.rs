@@ -157,6 +157,48 @@ fn others(wave: &[i16], bytes: &[u8]) -> Vec<(&'static str, u8, Vec<u8>)> {
     ]
 }
 
+/// Files of so many bytes that are right, with settings that make much of them: long ones, many slides, many textures,
+/// slides that are all copies.
+pub fn many_slides(bytes: usize) -> Vec<Vec<u8>> {
+    let mut state = 1_u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 20) as i16 - 2048
+    };
+    let wave: Vec<i16> = (0..bytes / 2).map(|_| noise()).collect();
+    let little = |wave: &[i16]| -> Vec<u8> { wave.iter().flat_map(|x| x.to_le_bytes()).collect() };
+    let again = wave[..1500].repeat(wave.len() / 1500);
+    let rows = |every: usize| -> Vec<u8> {
+        let rows = wave.iter().take(bytes / 16).enumerate();
+        let row = |(n, x): (usize, &i16)| format!("{:.3},{x},{}\n", n as f64 / 500.0, n / every);
+        let rows: String = rows.map(row).collect();
+        ("time,x,what\n".to_owned() + &rows).into_bytes()
+    };
+    let npy = |wave: &[i16]| npy::array("<i2", &[wave.len()], &little(wave));
+    const COPIES: usize = 3;
+    let all = [
+        ("length = 0.6\n", wav(44_100, &[&wave])),
+        (
+            "length = 0.6\n",
+            wav(192_000, &[&wave[..bytes / 4], &wave[bytes / 4..]]),
+        ),
+        (
+            "rate = 800\nlength = 0.5\nunit = \"counts\"\ngain = 0.5\n",
+            npy(&wave),
+        ),
+        ("rate = 800\nlength = 0.5\n", npy(&again)),
+        ("rate = 20\nlength = 60\n", npy(&wave)),
+        ("texture = \"what\"\n", rows(700)),
+        ("session = \"what\"\n", rows(700)),
+    ];
+    let all = all.map(|(settings, file)| [settings.as_bytes(), RULE, &[0][..], &file].concat());
+    // of copies alone nothing is left
+    for (place, one) in all.iter().enumerate() {
+        assert_eq!(imported(one).is_err(), place == COPIES, "{place}");
+    }
+    all.into()
+}
+
 /// Files of each kind that are right, long enough for a slide and of 8 KB at most; `import` has settings before them.
 pub(crate) fn seeds(with_settings: bool) -> Vec<Vec<u8>> {
     let wave: Vec<i16> = (0..2400)

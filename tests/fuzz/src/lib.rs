@@ -29,7 +29,7 @@ use tactus_link::log::{Line, TableParts};
 
 pub use flash::{Flash, images};
 pub use folder::{many_rows, recordings};
-pub use import::{import, signals};
+pub use import::{import, many_slides, signals};
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// More textures than any table for the probe has.

@@ -14,6 +14,8 @@ const STOPPING_S: f64 = 0.1;
 const WINDOW: usize = 32;
 /// Most windows that are compared in each second of a slide.
 const PER_SECOND: f64 = 64.0;
+/// Of a slow sensor one window in so many is compared: hours of it fit into memory.
+const LEAST_APART: u32 = 8;
 /// Fewest different windows of a slide whose parts are compared. One that is shorter, or repeats itself as a pure tone
 /// does, is compared as a whole.
 const FEWEST: usize = 16;
@@ -90,7 +92,7 @@ impl Fingerprint {
     fn of_samples(samples: impl Iterator<Item = u64>, rate_hz: f64) -> Self {
         const BASE: u64 = 0x9e37_79b9_7f4a_7c15;
         // `as` saturates
-        let every = ((rate_hz / PER_SECOND) as u32).max(1);
+        let every = ((rate_hz / PER_SECOND) as u32).max(LEAST_APART);
         let samples: Vec<u64> = samples.map(mixed).collect();
         let last = (0..WINDOW).fold(1_u64, |power, _| power.wrapping_mul(BASE));
         let (mut rolling, mut whole, mut hashes) = (0_u64, 0_u64, Vec::new());
@@ -239,7 +241,7 @@ pub(crate) struct DuplicateSlide {
 #[derive(Debug, Default)]
 pub(crate) struct DuplicateSearch {
     /// the first slide with a hash
-    seen: HashMap<u32, usize>,
+    seen: HashMap<u32, u32>,
     slides: Vec<String>,
 }
 
@@ -251,7 +253,7 @@ impl DuplicateSearch {
         Fingerprint(hashes): &Fingerprint,
         name: String,
     ) -> Result<(), DuplicateSlide> {
-        let mut of: HashMap<usize, usize> = HashMap::new();
+        let mut of: HashMap<u32, usize> = HashMap::new();
         for slide in hashes.iter().filter_map(|hash| self.seen.get(hash)) {
             *of.entry(*slide).or_default() += 1;
         }
@@ -259,15 +261,15 @@ impl DuplicateSearch {
         if shared * SHARED > hashes.len() {
             let most = of
                 .iter()
-                .max_by_key(|(slide, count)| (**count, usize::MAX - **slide));
-            let other = most.and_then(|(slide, _)| self.slides.get(*slide));
+                .max_by_key(|(slide, count)| (**count, u32::MAX - **slide));
+            let other = most.and_then(|(slide, _)| self.slides.get(*slide as usize));
             return Err(DuplicateSlide {
                 percent: shared * 100 / hashes.len(),
                 other: other.cloned().unwrap_or_default(),
             });
         }
         for hash in hashes {
-            self.seen.entry(*hash).or_insert(self.slides.len());
+            self.seen.entry(*hash).or_insert(self.slides.len() as u32);
         }
         self.slides.push(name);
         Ok(())

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use tactus_fuzz::memory::{Counting, most_of};
-use tactus_fuzz::{TARGETS, Target, many_rows, seeds};
+use tactus_fuzz::{TARGETS, Target, many_rows, many_slides, seeds};
 
 #[global_allocator]
 static MEMORY: Counting = Counting;
@@ -124,10 +124,10 @@ fn large(name: &str, seeds: &[Vec<u8>]) -> impl Iterator<Item = Vec<u8>> {
     let filled = heads.into_iter().flat_map(|head| {
         FILLING.map(|filling| [&head, filling.repeat(LARGE / filling.len()).as_slice()].concat())
     });
-    let rows = if name == "recordings" {
-        many_rows(LARGE)
-    } else {
-        Vec::new()
+    let rows = match name {
+        "recordings" => many_rows(LARGE),
+        "import" => many_slides(LARGE),
+        _ => Vec::new(),
     };
     repeated.chain(filled).chain(rows)
 }
