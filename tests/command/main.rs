@@ -7,6 +7,7 @@ mod endings;
 mod import;
 mod kills;
 mod offline;
+mod outputs;
 mod protocols;
 mod refusals;
 mod strangers;

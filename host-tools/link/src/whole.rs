@@ -46,7 +46,7 @@ impl WholeFile {
             (OpenOptions::new().write(true).open(path)?, None)
         } else {
             is_free(path, replaces)?;
-            let part = Lock::take(&beside(path)?)?;
+            let part = Lock::take(&beside(path)?).map_err(explained)?;
             part.file.set_len(0)?;
             if let Ok(there) = there {
                 part.file.set_permissions(there.permissions())?;
@@ -87,6 +87,22 @@ impl Write for WholeFile {
     }
 }
 
+/// What to do where a file cannot be made.
+fn explained(why: io::Error) -> io::Error {
+    let kind = why.kind();
+    match kind {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => io::Error::new(
+            kind,
+            "there is no such folder: make it first, or give another name",
+        ),
+        ErrorKind::InvalidFilename => io::Error::new(kind, "the name is too long: give another"),
+        ErrorKind::PermissionDenied => {
+            io::Error::new(kind, "nothing may be written there: give another folder")
+        }
+        _ => why,
+    }
+}
+
 fn is_free(path: &Path, replaces: bool) -> io::Result<()> {
     match fs::symlink_metadata(path) {
         Ok(_) if !replaces => {
@@ -123,6 +139,10 @@ pub struct NewOutputs {
 impl NewOutputs {
     /// Makes a folder, and those above it that are missing.
     pub fn folder(&mut self, path: &Path) -> io::Result<()> {
+        if !path.is_dir() && fs::symlink_metadata(path).is_ok() {
+            let why = "is no folder: give another name, or move it away";
+            return Err(io::Error::new(ErrorKind::NotADirectory, why));
+        }
         let missing = path.ancestors().filter(|path| *path != Path::new(""));
         let missing = missing.take_while(|path| fs::symlink_metadata(path).is_err());
         self.folders.extend(missing.map(Path::to_owned));

@@ -92,7 +92,11 @@ fn a_table_is_checked_pushed_and_pulled() {
     let copy = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     assert_eq!(fs::read(&copy).unwrap(), other);
     fs::write(&copy, "damaged").unwrap();
-    assert_says(&bench.error("table factory --yes"), &["is there already"]);
+    let why = bench.error("table factory --yes");
+    assert_says(
+        &why,
+        &["is not the table that it is named for", "move it away"],
+    );
     assert!(!bench.asked().iter().any(changes));
     fs::remove_file(&copy).unwrap();
     let said = bench.printed("table factory --yes --backup kept");
@@ -104,6 +108,8 @@ fn a_table_is_checked_pushed_and_pulled() {
             "3 textures",
         ],
     );
+    let why = bench.error("table push kept --yes --backup kept --force");
+    assert_says(&why, &["kept: is read by this command"]);
     // the firmware's own table is never lost, so that nobody is asked; what was kept is in use again
     assert_says(
         &bench.printed("table push kept"),

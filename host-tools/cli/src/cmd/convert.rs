@@ -15,7 +15,7 @@ use tactus_core::wire::{Event, Report, SlideReport};
 use tactus_lab::data::recording::PAC_RATE_HZ;
 use tactus_link::log::{self, Line, TableParts};
 
-use super::table_file::{Force, Output, is_pipe, opened};
+use super::table_file::{Force, Output, is_pipe, opened, spare_input};
 
 /// Convert a session's log to MCAP, for Foxglove and PlotJuggler
 #[derive(clap::Args)]
@@ -36,6 +36,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let Args { from, mcap, force } = args;
+    spare_input(mcap, from)?;
     let log = convert(Output::create(mcap, *force)?, from)?;
     let written = log.failed.and_then(|()| log.to.finish());
     written.with_context(|| mcap.display().to_string())?;

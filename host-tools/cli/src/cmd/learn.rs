@@ -19,7 +19,7 @@ use tactus_lab::sim::collection::texture_name;
 
 use super::args::{Expecting, Features, Recordings, false_alarm, length, rising};
 use super::progress::with_progress;
-use super::table_file::{Force, beside, write_file};
+use super::table_file::{Force, beside, spare_input, write_file};
 use super::textures::{collection, measure_folder};
 
 /// Learn a texture table from the first slides of every texture
@@ -92,6 +92,7 @@ pub(crate) struct ByHand {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let folder = args.from.folder()?;
+    spare_input(&args.out, &folder)?;
     let (set, mut measured) = measure_folder(&folder)?;
     if !args.lengths.is_empty() {
         // the first parts have few frames

@@ -1,11 +1,10 @@
 //! `--plot`: pictures as SVG in a folder.
 
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tactus_lab::data::whole::{NewOutputs, write_whole};
+use tactus_lab::data::whole::{Lock, NewOutputs, write_whole};
 use tactus_study::chart::Figure;
 
 use super::progress::notice;
@@ -25,8 +24,7 @@ impl Plot {
         };
         let (mut made, part) = (NewOutputs::default(), path.join(".tactus-plot.part"));
         made.folder(&path)
-            .and_then(|()| fs::write(&part, b""))
-            .and_then(|()| fs::remove_file(&part))
+            .and_then(|()| Lock::take(&part).map(drop))
             .with_context(|| cannot(&path))?;
         Ok(Some(Canvas(path, made)))
     }

@@ -21,7 +21,7 @@ use super::args::Recordings;
 use super::output::{Format, UsageError, percent, print_json, verdict_rows};
 use super::plot::Plot;
 use super::progress::{notice, progress};
-use super::table_file::{Force, read_table, write_file};
+use super::table_file::{Force, read_table, spare_input, write_file};
 use super::textures::{measure_folder, of_one_finger};
 
 /// Say what a table is good for, or how repeatable recorded slides are by part and operator
@@ -86,6 +86,11 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
     if args.recordings.len() > 1 || args.plot.plot.is_some() {
         let say = "with a table, give --recordings once and no --plot";
         return Err(UsageError(say.to_owned()).into());
+    }
+    for input in args.recordings.iter().chain([&file.to_owned()]) {
+        args.out
+            .iter()
+            .try_for_each(|out| spare_input(out, input))?;
     }
     let mut bytes = Vec::new();
     let table = read_table(file, &mut bytes)?;

@@ -34,6 +34,31 @@ pub(crate) fn write_file(file: &Path, bytes: &[u8], Force { force }: Force) -> a
     written.map_err(|why| unwritten(file, why))
 }
 
+/// Files of recordings, by how their names end.
+const OF_RECORDINGS: [&str; 5] = [
+    "manifest.csv",
+    "manifest.json",
+    "import.toml",
+    ".npy",
+    ".gz",
+];
+
+/// Refuses to write over what is read, with force as well: a file itself, or one of a folder of recordings.
+pub(crate) fn spare_input(file: &Path, input: &Path) -> anyhow::Result<()> {
+    // the file may not be there, or be a pipe
+    let (Ok(target), Ok(read)) = (file.canonicalize(), input.canonicalize()) else {
+        return Ok(());
+    };
+    let name = target.to_string_lossy();
+    let of_folder = OF_RECORDINGS.iter().any(|end| name.ends_with(end));
+    anyhow::ensure!(
+        target != read && !(of_folder && target.starts_with(&read)),
+        "{}: is read by this command, and not replaced: give another name",
+        file.display()
+    );
+    Ok(())
+}
+
 fn unwritten(file: &Path, why: io::Error) -> anyhow::Error {
     let name = file.display();
     match why.kind() {

@@ -3,7 +3,7 @@
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use tactus_lab::data::recordings::files::sha256;
 use tactus_link::PushTable;
@@ -91,7 +91,13 @@ impl Consent {
             !is_pipe(&file),
             "--backup: name a file, which can be read again"
         );
-        write_file(&file, table, force)?;
+        let written = write_file(&file, table, force);
+        if self.backup.is_none() && written.is_err() && file.exists() {
+            bail!(
+                "{name}: is not the table that it is named for; move it away, or name a file with --backup"
+            );
+        }
+        written?;
         let kept = std::fs::metadata(&file).is_ok_and(|kept| kept.is_file());
         let kept = if kept {
             std::fs::read(&file)

@@ -12,7 +12,7 @@ use tactus_link::operations;
 use super::bench::Bench;
 use super::line::{Consent, Where};
 use crate::cmd::output::{Format, print_json};
-use crate::cmd::table_file::{Force, beside, read_table, write_file};
+use crate::cmd::table_file::{Force, beside, read_table, spare_input, write_file};
 
 /// Show, fetch or replace the probe's texture table
 #[derive(Subcommand)]
@@ -89,6 +89,9 @@ pub(crate) fn run(command: &Command, out: &mut impl Write) -> anyhow::Result<()>
         Command::Push { at, file, consent } => {
             let mut bytes = Vec::new();
             let table = read_table(file, &mut bytes)?;
+            let kept = consent.backup.iter();
+            kept.into_iter()
+                .try_for_each(|kept| spare_input(kept, file))?;
             let file = file.display().to_string();
             let (mut bench, _) = Bench::open(at, Format::Text)?;
             bench.consent = consent.clone();

@@ -237,7 +237,7 @@ impl Drop for RecordingWriter {
 fn put(folder: &Path, name: &str, bytes: &[u8], made: &mut NewOutputs) -> Result<()> {
     let path = folder.join(name);
     made.file(path.clone());
-    fs::write(&path, bytes).map_err(|e| io_error(&path, e))
+    write_here(&path, bytes).map_err(|e| io_error(&path, e))
 }
 
 /// The row of a slide; its files are `put` where they belong.
@@ -336,7 +336,7 @@ fn note(command: &str) -> String {
 }
 
 fn read_note(folder: &Path) -> Result<Option<String>> {
-    match open(&folder.join(INCOMPLETE)).and_then(io::read_to_string) {
+    match open(&inside(folder, INCOMPLETE, INCOMPLETE)?).and_then(io::read_to_string) {
         Ok(note) => Ok(Some(note)),
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(why) => Err(io_error(&folder.join(INCOMPLETE), why)),
@@ -365,7 +365,7 @@ fn key(row: &[String], textures: &[Texture]) -> Option<(usize, u32)> {
 }
 
 fn read_rows(folder: &Path) -> Result<String> {
-    let path = folder.join(ROWS);
+    let path = inside(folder, ROWS, ROWS)?;
     let mut bytes = Vec::new();
     match open(&path).and_then(|mut rows| rows.read_to_end(&mut bytes)) {
         // a character that is cut is in the last row
@@ -430,10 +430,18 @@ fn csv<'r>(rows: impl Iterator<Item = &'r Vec<String>>) -> std::io::Result<Vec<u
 
 const PART: &str = "INCOMPLETE.part";
 
+/// Writes a file at this place, not where a link leads to from it.
+fn write_here(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if fs::symlink_metadata(path).is_ok_and(|there| !there.is_file()) {
+        fs::remove_file(path)?;
+    }
+    fs::write(path, bytes)
+}
+
 /// Writes a file of the folder, whole or not at all.
 fn replace(folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
     let (part, path) = (folder.join(PART), folder.join(name));
-    let replaced = fs::write(&part, bytes).and_then(|()| fs::rename(&part, &path));
+    let replaced = write_here(&part, bytes).and_then(|()| fs::rename(&part, &path));
     replaced.map_err(|e| {
         let _ = fs::remove_file(&part);
         io_error(&path, e)

@@ -1,17 +1,20 @@
 //! The files below a folder, and what their paths say.
 
 use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::columns::{no_channel, time};
 use crate::data::import::on_line;
 use crate::data::import::settings::{Named, Settings, guessed, matched};
 use crate::data::import::signals::{Signals, not_read};
-use crate::data::recordings::files::confined;
+use crate::data::recordings::files::{OWN_MANIFEST, confined, open};
 use crate::data::recordings::{RecordingError, Result};
 
 /// Deepest folder below the one that is imported.
 const DEPTH: usize = 8;
+/// Longest header of a manifest that is looked at, bytes.
+const MAX_HEADER: u64 = 4096;
 /// Most that an error names of what is left out.
 const NAMED: usize = 8;
 /// Most files of one import.
@@ -157,6 +160,21 @@ pub(super) fn add(signals: &mut Signals, beside: &Path, settings: &Settings) -> 
     Ok(())
 }
 
+/// True if a folder holds recordings in the project's own format: another manifest is a file as others.
+fn is_ours(folder: &Path) -> bool {
+    let mut begin = Vec::new();
+    let manifest = open(&folder.join(OWN_MANIFEST));
+    let read = manifest.and_then(|file| file.take(MAX_HEADER).read_to_end(&mut begin));
+    let header = begin
+        .split(|byte| *byte == b'\n')
+        .next()
+        .unwrap_or_default();
+    read.is_ok()
+        && header
+            .split(|byte| *byte == b',')
+            .any(|name| name.trim_ascii() == b"pac_file")
+}
+
 fn walk(folder: &Path, above: &str, depth: usize, below: &mut Below) -> Result<()> {
     let fault = |why: std::io::Error| RecordingError::at(folder, why);
     for entry in fs::read_dir(folder).map_err(fault)? {
@@ -171,13 +189,16 @@ fn walk(folder: &Path, above: &str, depth: usize, below: &mut Below) -> Result<(
         // of the entry itself: what a link leads to is not looked at
         let kind = entry.file_type().map_err(fault)?;
         let why = if kind.is_dir() {
-            if depth < DEPTH {
+            if is_ours(&entry.path()) {
+                Some("recordings of this project; import that folder by itself".to_owned())
+            } else if depth < DEPTH {
                 walk(&entry.path(), &format!("{path}/"), depth + 1, below)?;
                 continue;
+            } else {
+                Some(format!(
+                    "a folder deeper than {DEPTH}; import the one that it is in"
+                ))
             }
-            Some(format!(
-                "a folder deeper than {DEPTH}; import the one that it is in"
-            ))
         } else if kind.is_symlink() {
             Some("a symbolic link, which is not followed; put the file itself here".to_owned())
         } else if !kind.is_file() {
