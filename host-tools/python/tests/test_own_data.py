@@ -256,3 +256,29 @@ def test_the_five_lines_of_the_book_come_to_a_verdict(capsys):
         exec(lines, {"arrays": others, "labels": names, "array": arrays[place].astype("f4")})
         told = ast.literal_eval(capsys.readouterr().out)
         assert (told["told"], told["texture"]) == ("sure", label)
+
+
+def test_what_was_not_measured_stays_unknown_and_names_of_ours_are_refused(tmp_path):
+    arrays = [np.random.default_rng(seed).normal(size=4400) for seed in range(4)]
+    given = dict(rate_hz=2200, labels=["cork", "cork", "silk", "silk"])
+    for name in "tactus-x", "Tactus-X":
+        with pytest.raises(tactus.RecordingError, match="biotac, analog, mems, or another name"):
+            tactus.Recordings.from_arrays(arrays, finger=name, **given)
+    known = tactus.Recordings.from_arrays(arrays, speed_mm_s=20, finger="biotac", **given)
+    known.write(tmp_path / "own")
+    for recordings in known, tactus.Recordings(tmp_path / "own"):
+        assert recordings.settings == [(0, 20)] and recordings.finger[0] == "biotac"
+        features = recordings.features()
+        assert np.isnan(features["force_n"]).all() and (features["speed_mm_s"] == 20).all()
+        assert np.isnan(features["pdc"]).all() and np.isnan(features["traction_n"]).all()
+        assert tactus.Table.learn(recordings).settings == [(0, 20)]
+    # a manifest by hand
+    text = (tmp_path / "own" / "manifest.csv").read_text()
+    rows = [row.split(",") for row in text.splitlines()]
+    keep = [rows[0].index(name) for name in ("name", "pac_file", "pac_rate_hz")]
+    text = "\n".join(",".join(row[at] for at in keep) for row in rows)
+    (tmp_path / "own" / "manifest.csv").write_text(text)
+    assert tactus.Recordings(tmp_path / "own").settings == [(0, 0)]
+    (tmp_path / "own" / "manifest.csv").write_text(text.replace("name,", "finger,name,").replace("\n", "\ntactus-x,"))
+    with pytest.raises(tactus.RecordingError, match="tactus-x"):
+        tactus.Recordings(tmp_path / "own")

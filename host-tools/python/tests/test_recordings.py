@@ -118,11 +118,16 @@ def test_what_is_no_slide_is_refused(small):
     slide = small.slides(small.textures[0])[0]
     good = dict(window_s=slide.window_s, force_n=0.5, speed_mm_s=25.1, still=slide.still)
     assert tactus.features(slide.pac, **good).traction_n is None
+    # a rig that measures nothing else
+    alone = tactus.features(slide.pac, window_s=slide.window_s)
+    assert (alone.force_n, alone.speed_mm_s, alone.traction_n) == (0, 0, None)
+    slow = tactus.features(slide.pac, window_s=slide.window_s, speed_mm_s=25, pdc=[1] * 99, pdc_rate_hz=6.5)
+    assert (slow.force_n, slow.speed_mm_s) == (0, pytest.approx(25))
     for wrong, said in [
         (dict(window_s=(0.1, 99.0)), "99"),
         (dict(window_s=(0.3, 0.2)), "0.3"),
         (dict(force_n=70.0), "70000 mN"),
-        (dict(still=None), "still finger"),
+        (dict(still=np.zeros(0, np.int16)), "still finger"),
     ]:
         with pytest.raises(tactus.SlideError, match=said):
             tactus.features(slide.pac, **{**good, **wrong})
