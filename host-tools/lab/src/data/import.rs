@@ -41,7 +41,7 @@ use settings::{SETTINGS, Settings};
 
 mod cut;
 pub mod foreign;
-mod resample;
+pub(crate) mod resample;
 pub mod settings;
 pub mod signals;
 pub mod signs;

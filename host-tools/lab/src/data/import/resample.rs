@@ -4,11 +4,11 @@ use rubato::audioadapter_buffers::direct::SequentialSlice;
 use rubato::{Fft, FixedSync, Resampler as _};
 
 /// Rates that are resampled, Hz; slower ones are taken for a slower clock.
-pub(super) const RATES_HZ: std::ops::RangeInclusive<f64> = 500.0..=192_000.0;
+pub(crate) const RATES_HZ: std::ops::RangeInclusive<f64> = 500.0..=192_000.0;
 
 /// The signal at another rate, both in whole Hz; as long as it was, to a sample. What the new rate cannot carry is
 /// taken out before.
-pub(super) fn resample(samples: &[f64], from_hz: u32, to_hz: u32) -> Vec<f64> {
+pub(crate) fn resample(samples: &[f64], from_hz: u32, to_hz: u32) -> Vec<f64> {
     if from_hz == to_hz {
         return samples.to_vec();
     }

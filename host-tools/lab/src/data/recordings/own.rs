@@ -4,7 +4,7 @@
 //! | column | what it holds |
 //! |---|---|
 //! | `name` | name of the texture, without spaces around it |
-//! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; the rate is 2200 |
+//! | `pac_file`, `pac_rate_hz`, `pac_sha256` | P_AC in counts about the still baseline; 500 to 192000 Hz |
 //! | `texture` | number of the texture; the same number always has the same name; empty: the next that is free |
 //! | `slide` | number of the slide of its texture, in the order of time, each once; empty: one more than the last |
 //! | `force_n`, `speed_mm_s` | the movement: contact force in N, sliding speed in mm/s; empty if unknown |
@@ -22,7 +22,8 @@
 //! | `pace` | ln(mean speed / `speed_mm_s`) in 1/1024, by a sensor of motion; empty if not measured |
 //! | `version` | version of this format, 1; empty for 1 |
 //!
-//! `name`, `pac_file` and `pac_rate_hz` must be there. Any other cell may be empty, and any other column missing. The
+//! P_AC of another rate than 2200 Hz is resampled, band-limited, where it is read; what a slower one could not measure
+//! is left out. `name`, `pac_file` and `pac_rate_hz` must be there. Any other cell may be empty, and any other column missing. The
 //! rate of P_DC and of shear, where it is empty, is that by which their samples last as long as those of P_AC.
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it, and
@@ -109,6 +110,7 @@ struct Entry {
     window: [Option<f32>; 2],
     background: Background,
     pac: Stream,
+    pac_rate_hz: f64,
     pdc: Option<Stream>,
     pdc_rate_hz: Option<f64>,
     shear: Option<Stream>,
@@ -233,6 +235,29 @@ impl Numbers {
     }
 }
 
+/// True for rates that P_AC is read at.
+fn is_read(rate_hz: f64) -> bool {
+    #[cfg(feature = "files")]
+    if crate::data::import::resample::RATES_HZ.contains(&rate_hz) {
+        return true;
+    }
+    rate_hz == f64::from(PAC_RATE_HZ)
+}
+
+/// P_AC at its own rate, from the rate that it was recorded at.
+fn resampled(samples: Vec<i16>, rate_hz: f64) -> Vec<i16> {
+    #[cfg(feature = "files")]
+    if rate_hz != f64::from(PAC_RATE_HZ) {
+        use crate::data::import::resample::resample;
+        let samples: Vec<f64> = samples.into_iter().map(f64::from).collect();
+        // `as` saturates
+        let resampled = resample(&samples, rate_hz.round() as u32, PAC_RATE_HZ);
+        return resampled.into_iter().map(|x| x.round() as i16).collect();
+    }
+    let _ = rate_hz;
+    samples
+}
+
 /// A number that may be unknown.
 fn optional<T>(row: &Row<'_>, column: &'static str) -> Result<Option<T>>
 where
@@ -257,10 +282,10 @@ impl Entry {
         let movement = Movement::partly(optional(row, "force_n")?, optional(row, "speed_mm_s")?)
             .map_err(|why| row.error(None, format!("{why}; {LEAVE_OUT}")))?;
         let pac_rate_hz: f64 = row.number("pac_rate_hz")?;
-        if pac_rate_hz != f64::from(PAC_RATE_HZ) {
+        if !is_read(pac_rate_hz) {
             let cause = format!(
-                "{pac_rate_hz} Hz, and recordings have {PAC_RATE_HZ} Hz: put the .npy files alone into a folder, and \
-                 `tactus import FOLDER NEW --rate {pac_rate_hz}` resamples them"
+                "{pac_rate_hz} Hz, and 500 to 192000 Hz are resampled to {PAC_RATE_HZ} Hz: `tactus import FOLDER NEW \
+                 --rate {pac_rate_hz}` reads .npy files of a slower sensor, in folders of their textures"
             );
             return Err(row.error(Some("pac_rate_hz"), cause));
         }
@@ -285,6 +310,7 @@ impl Entry {
             ],
             background,
             pac: pac.ok_or_else(|| row.error(Some("pac_file"), "no file is named"))?,
+            pac_rate_hz,
             pdc: Stream::of(row, "pdc_file", "pdc_sha256")?,
             pdc_rate_hz: optional(row, "pdc_rate_hz")?,
             shear: Stream::of(row, "shear_file", "shear_sha256")?,
@@ -298,12 +324,12 @@ impl Entry {
     }
 
     fn load(&self, folder: &Path, texture: usize) -> Result<Recording> {
-        let pac = self.pac.load(folder)?;
+        let pac = resampled(self.pac.load(folder)?, self.pac_rate_hz);
         let pdc = self.pdc.as_ref().map(|s| s.load(folder)).transpose()?;
         let shear = self.shear.as_ref().map(|s| s.load(folder)).transpose()?;
         let (background, still) = match &self.background {
             Background::Power(power) => (Some(*power), Vec::new()),
-            Background::Still(still) => (None, still.load(folder)?),
+            Background::Still(still) => (None, resampled(still.load(folder)?, self.pac_rate_hz)),
         };
         let seconds = pac.len() as f64 / f64::from(PAC_RATE_HZ);
         // all streams cover the same time
@@ -329,7 +355,10 @@ impl Entry {
             outside_mn: None,
             pace: self.pace,
             shear_rate_hz,
-            highest_hz: self.highest_hz,
+            highest_hz: self.highest_hz.or_else(|| {
+                let slow = self.pac_rate_hz < f64::from(PAC_RATE_HZ);
+                slow.then_some(self.pac_rate_hz as f32 / 2.0)
+            }),
         };
         let slide = slide.cut(&still, &pac, shear.as_deref());
         slide.map_err(|cause| {

@@ -153,7 +153,8 @@ pac_sha256 | pac_file | manifest.csv:1: | two columns pac_file
 0.200 | 9 | manifest.csv:2: | contact force 9000 mN is outside
 7, | seven, | manifest.csv:2: column texture | "seven" is not the number of a texture
 ,4, | ,-4, | manifest.csv:3: column slide | "-4" is not the number of a slide
-,2200, | ,2000.5, | column pac_rate_hz: 2000.5 Hz, and | `tactus import FOLDER NEW --rate 2000.5`
+,2200, | ,100.5, | column pac_rate_hz: 100.5 Hz, and | `tactus import FOLDER NEW --rate 100.5`
+,2200, | ,nan, | column pac_rate_hz: nan | not a finite number
 ,100, | ,0, | manifest.csv: line 2 | 0 Hz for P_DC is impossible
 0.02,0.1, | 0.1,0.1, | manifest.csv: line 2 | is not a stretch of time
 0.02,0.1, | 0.02,0.2, | manifest.csv: line 2 | P_AC (samples: 220
@@ -264,6 +265,29 @@ fn a_force_alone_a_speed_alone_and_rates_that_are_no_whole_numbers_are_kept() {
     let copy = TempDir::new().unwrap();
     write_own(copy.path(), &slides);
     assert_eq!(load(copy.path()).unwrap(), slides);
+}
+
+#[test]
+fn p_ac_of_another_rate_is_resampled() {
+    let tone = |rate_hz: f64, n: usize| {
+        let phase = std::f64::consts::TAU * 90.0 * n as f64 / rate_hz;
+        (1000.0 * phase.sin()).round() as i16
+    };
+    for (rate, highest) in [("1000", Some(500.0)), ("48000", None), ("2200.0", None)] {
+        let rate_hz: f64 = rate.parse().unwrap();
+        let folder = TempDir::new().unwrap();
+        let samples: Vec<i16> = (0..rate_hz as usize).map(|n| tone(rate_hz, n)).collect();
+        fs::write(folder.path().join("a.npy"), npy::write(&samples)).unwrap();
+        let manifest = format!("name,pac_file,pac_rate_hz\nfelt,a.npy,{rate}\n");
+        fs::write(folder.path().join(OWN_MANIFEST), manifest).unwrap();
+        let slide = load(folder.path()).unwrap().remove(0);
+        let pac = slide.pac();
+        assert_eq!((pac.len(), slide.highest_hz), (2200, highest), "{rate}");
+        // the ends are those of a filter
+        for (n, x) in pac.iter().enumerate().take(1800).skip(400) {
+            assert!(x.abs_diff(tone(2200.0, n)) <= 3, "{rate}: {n} {x}");
+        }
+    }
 }
 
 #[test]
