@@ -23,8 +23,9 @@
 //! | `version` | version of this format, 1; empty for 1 |
 //!
 //! P_AC of another rate than 2200 Hz is resampled, band-limited, where it is read; what a slower one could not measure
-//! is left out. `name`, `pac_file` and `pac_rate_hz` must be there. Any other cell may be empty, and any other column missing. The
-//! rate of P_DC and of shear, where it is empty, is that by which their samples last as long as those of P_AC.
+//! is left out. `name`, `pac_file` and `pac_rate_hz` must be there. Any other cell may be empty, and any other column
+//! missing. The rate of P_DC and of shear, where it is empty, is that by which their samples last as long as those of
+//! P_AC.
 //!
 //! Columns may come in any order, others are ignored. Files are named relative to the folder and lie inside it, and
 //! symbolic links do not lead out; each is a one-dimensional array of `<i2` (numpy.int16) of 262144 samples at most.
