@@ -90,9 +90,15 @@ pub(crate) struct ByHand {
     finger: FingerName,
 }
 
-pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+/// The folder, in which no file of recordings is replaced.
+fn recordings_of(args: &Args) -> anyhow::Result<PathBuf> {
     let folder = args.from.folder()?;
     spare_input(&args.out, &folder)?;
+    Ok(folder)
+}
+
+pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
+    let folder = recordings_of(args)?;
     let (set, mut measured) = measure_folder(&folder)?;
     if !args.lengths.is_empty() {
         // the first parts have few frames
