@@ -6,7 +6,6 @@ mod gates;
 mod inputs;
 mod on_the_rig;
 mod row;
-pub mod slowed;
 #[path = "../../../../firmware/src/bench/workload.rs"]
 pub mod workload;
 
@@ -18,7 +17,6 @@ use clap::Args as Arguments;
 use serde_json::Value;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
-use tactus_core::wire::Identify;
 
 use self::counter::Bench;
 use self::gates::{GATES, gate};
@@ -45,28 +43,15 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// An exploration of one slide, the same each time.
-fn one_slide() -> Identify {
-    Identify {
-        threshold: 1.0,
-        max_slides: 1,
-        open: false,
-        seed: 1,
-        ..Identify::default()
-    }
-}
-
 /// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
 const MISSED: u8 = 2;
 const DIFFERENT: &str = "not what the plain kernels give: ";
 
 /// Counts, and says by its exit code whether every gate is met.
 pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let met = count(args)?;
-    Ok(if met {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(MISSED)
+    Ok(match count(args)? {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(MISSED),
     })
 }
 
@@ -89,10 +74,8 @@ fn count(args: &Args) -> anyhow::Result<bool> {
     extremes(&mut bench)?;
     let (samples, source) = slide()?;
     let mut rows = kernels(&mut bench, &samples)?;
-    let mut slow = None;
     if let Some(rig) = &args.rig {
         rows.extend(on_the_rig(rig, args.finger)?);
-        slow = Some(slowed::slowed(rig, slowed::WORST_RATIO * slowed::RESERVE));
         let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
         if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
             bail!("{name}: it has a gate and was not counted");
@@ -100,9 +83,6 @@ fn count(args: &Args) -> anyhow::Result<bool> {
     }
     if text {
         print(&rows, source);
-        if let Some(slowed) = &slow {
-            slowed::print(slowed);
-        }
     } else {
         println!("{}", Value::from_iter(rows.iter().map(Row::json)));
     }
@@ -111,8 +91,7 @@ fn count(args: &Args) -> anyhow::Result<bool> {
     if !different.is_empty() {
         bail!(DIFFERENT.to_owned() + &different.join("; "));
     }
-    let in_time = slow.is_none_or(|slowed| slowed::missed(&slowed).is_empty());
-    Ok(in_time && rows.iter().all(Row::ok))
+    Ok(rows.iter().all(Row::ok))
 }
 
 /// A kernel that is to be counted: its work, and what it is held against.
