@@ -651,18 +651,14 @@ fn high_forces_want_the_button_and_say_so() {
     let mut probe = Probe::default();
     let status = wire::Status {
         phase: Phase::Ready,
-        fault: None,
         textures: 3,
         table_bytes: 900,
         table_crc: 7,
-        factory: false,
         calibrated: 20_261_121,
-        counts: wire::Counts::default(),
         skin_mj: (1, 1),
-        false_alarm: None,
         // so that nobody is asked for mount or stop
         high_force: true,
-        finger: FingerCode::BIOTAC,
+        ..wire::Status::default()
     };
     let mut set = std::pin::pin!(super::operations::set_high_force(&host, true));
     let mut context = std::task::Context::from_waker(std::task::Waker::noop());

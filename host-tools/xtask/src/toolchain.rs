@@ -87,7 +87,8 @@ fn help(target: Target) -> String {
 Install one of:
   with rustup         rustup target add {}
   Debian 12, as root  apt-get update
-                      apt-get install --no-install-recommends rustc-web cargo-web rust-web-src rust-web-llvm lld-22 llvm-22
+                      apt-get install --no-install-recommends rustc-web cargo-web rust-web-src \
+                      rust-web-llvm lld-22 llvm-22
   newer Debian        apt-get install --no-install-recommends rustc cargo rust-src lld   (Rust 1.95 or newer)
 and run the command again.",
         target.triple

@@ -177,9 +177,10 @@ pub enum Reset {
 }
 
 /// What the rig does: [`crate::rig::Phase`] without its fault.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub enum Phase {
     /// It does not know where it is.
+    #[default]
     Parked,
     /// It looks for its limit switches.
     Homing,
@@ -220,7 +221,7 @@ impl From<crate::rig::Phase> for Phase {
 }
 
 /// How the probe is.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct Status {
     /// What the rig does.
     pub phase: Phase,

@@ -2,9 +2,8 @@
 
 use std::io::{Read as _, Write as _};
 
-use tactus_core::sensor::FingerCode;
 use tactus_core::table::{Action, Table, factory};
-use tactus_core::wire::{self, Command, Counts, Event, Failure, MAX_FRAME, Phase, Receiver};
+use tactus_core::wire::{self, Command, Event, Failure, MAX_FRAME, Phase, Receiver};
 use tactus_core::wire::{PART, Report, Request, SlideReport, Status, Verdict};
 
 use super::software::line;
@@ -43,17 +42,12 @@ fn probe(answers: impl Fn(&Request) -> Vec<Event> + Send + 'static) -> Scratch {
 fn status() -> Status {
     Status {
         phase: Phase::Ready,
-        fault: None,
         textures: 3,
         table_bytes: 900,
         table_crc: 7,
-        factory: false,
         calibrated: 20_261_121,
-        counts: Counts::default(),
         skin_mj: (1, 1),
-        false_alarm: None,
-        high_force: false,
-        finger: FingerCode::BIOTAC,
+        ..Status::default()
     }
 }
 

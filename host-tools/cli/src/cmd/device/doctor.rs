@@ -341,17 +341,8 @@ mod tests {
             };
             let status = Status {
                 phase: tactus_core::wire::Phase::Ready,
-                fault: None,
-                textures: 0,
-                table_bytes: 0,
-                table_crc: 0,
-                factory: false,
-                calibrated: 0,
                 counts,
-                skin_mj: (0, 0),
-                false_alarm: None,
-                high_force: false,
-                finger: Default::default(),
+                ..Status::default()
             };
             let mut checks = Checks::default();
             acquisition(&status, &mut checks);

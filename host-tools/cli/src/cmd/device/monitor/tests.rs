@@ -5,11 +5,10 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
-use tactus_core::sensor::FingerCode;
 use tactus_core::table::Action;
 use tactus_core::wire::{
-    Command, Counts, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status,
-    Text, Verdict,
+    Command, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status, Text,
+    Verdict,
 };
 
 use super::state::{Monitor, NOTES, SHOWN};
@@ -18,17 +17,12 @@ use super::{End, KEYS, command_of, end_of, is_gone, view};
 fn status() -> Status {
     Status {
         phase: Phase::Ready,
-        fault: None,
         textures: 4,
         table_bytes: 900,
         table_crc: 7,
         factory: true,
-        calibrated: 0,
-        counts: Counts::default(),
         skin_mj: (1500, 250),
-        false_alarm: None,
-        high_force: false,
-        finger: FingerCode::BIOTAC,
+        ..Status::default()
     }
 }
 
@@ -108,19 +102,29 @@ fn exploration() -> Vec<Event> {
 fn a_slide_looks_like_this() {
     let screen = screen(&heard(exploration()), 80, 24);
     let golden = "\
-╭ Rig ─────────────────╮╭ What it may be ──────────────────────────────────────╮
-│phase   sliding       ││Oak wood                 ███████████████░░░░░  75.0 % │
-│force   1.050 N       ││Velcro                   ███░░░░░░░░░░░░░░░░░  15.0 % │
-│████████░░┃░░░░░ 2.1 N││Burlap                   █░░░░░░░░░░░░░░░░░░░   5.0 % │
-│speed    10.0 mm/s    ││Felt                     █░░░░░░░░░░░░░░░░░░░   5.0 % │
-│stage    31.3 mm      ││                                                      │
-│lever    1.00 mm      ││                                                      │
-│motor     132 mA      ││                                                      │
-╰──────────────────────╯╰──────────────────────────────────────────────────────╯
-╭ Messages ────────────────────────────────────────────────────────────────────╮
-│0:00:01 slide 1: 1.26 N, 10.0 mm/s                                            │
-│0:00:03 slide 1: most likely Oak wood, 75.0 %                                 │";
-    assert_eq!(screen[10..22].join("\n"), golden);
++ Rig -----------------++ What it may be --------------------------------------+
+|phase   sliding       ||Oak wood                 ###############.....  75.0 % |
+|force   1.050 N       ||Velcro                   ###.................  15.0 % |
+|########..!..... 2.1 N||Burlap                   #...................   5.0 % |
+|speed    10.0 mm/s    ||Felt                     #...................   5.0 % |
+|stage    31.3 mm      ||                                                      |
+|lever    1.00 mm      ||                                                      |
+|motor     132 mA      ||                                                      |
++----------------------++------------------------------------------------------+
++ Messages --------------------------------------------------------------------+
+|0:00:01 slide 1: 1.26 N, 10.0 mm/s                                            |
+|0:00:03 slide 1: most likely Oak wood, 75.0 %                                 |";
+    let plain = |letter: char| match letter {
+        '╭' | '╮' | '╰' | '╯' => '+',
+        '─' => '-',
+        '│' => '|',
+        '█' => '#',
+        '░' => '.',
+        '┃' => '!',
+        letter => letter,
+    };
+    let shown: String = screen[10..22].join("\n").chars().map(plain).collect();
+    assert_eq!(shown, golden);
     assert_eq!(
         screen[0],
         " Tactus  /dev/ttyACM0  4 textures (factory)            nothing lost, up 0:00:04"
