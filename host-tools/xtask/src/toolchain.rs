@@ -156,7 +156,7 @@ pub(crate) fn host_build(folder: &Path) -> Command {
     cargo
 }
 
-/// What every such build gets, then these.
+/// The flags of every such build, then these.
 pub(crate) fn rustflags() -> OsString {
     let mut flags = OsString::from("-Dwarnings");
     let mut leave_out = |folder: &Path, name: &str| {
@@ -197,7 +197,7 @@ fn debian_cargo() -> Command {
     cargo
 }
 
-/// What Debian's toolchain lacks to build for another target, if anything.
+/// The part that Debian's toolchain lacks to build for another target, if any.
 fn debian_lacks() -> Option<String> {
     if !Path::new(DEBIAN_CARGO).exists() {
         return Some(format!("there is no {DEBIAN_CARGO}"));

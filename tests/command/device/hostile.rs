@@ -51,7 +51,7 @@ fn status() -> Status {
     }
 }
 
-/// What a line makes of bytes.
+/// A line's effect on bytes.
 type Carries = fn(&[u8]) -> Vec<u8>;
 
 /// A port that sends back what comes so.

@@ -113,7 +113,7 @@ fn the_first_zero_is_that_of_the_calibration() {
     }
 }
 
-/// What nobody has calibrated yet, of a finger that says 240 counts more in the air than the default.
+/// The calibration of a rig that nobody has calibrated, whose finger says 240 counts more in the air than the default.
 fn far_off_default(rig: &mut SimRig) -> RigCalibration {
     let unmeasured = *rig.control().calibration();
     assert!(!unmeasured.air_known);

@@ -296,7 +296,7 @@ impl Operator for Helper<'_> {
     }
 }
 
-/// How an evening ended.
+/// The end of an evening.
 struct Evening {
     passed: bool,
     /// the step that failed, and the mistakes that it names

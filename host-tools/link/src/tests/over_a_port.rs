@@ -65,7 +65,7 @@ fn a_port_runs_transactions() {
     );
 }
 
-/// What a line may do to a stretch of bytes.
+/// Disturbance of a stretch of bytes on the line.
 /// Sends without end, and nothing of it is a report.
 struct Noise;
 

@@ -129,7 +129,7 @@ fn learned_event(name: &str, slides: u8, itself: bool) -> Event {
     })
 }
 
-/// What is known of these textures is the same to the bit, and from whom.
+/// Checks that these textures' statistics are the same to the bit, and from whom.
 fn same(new: &Table<'_>, old: &Table<'_>, textures: &[u16]) {
     for &texture in textures {
         assert_eq!(new.tally(texture), old.tally(texture));

@@ -22,7 +22,7 @@ pub(super) fn is_off(check: &Location<'_>) -> bool {
         .is_some_and(|(file, line)| check.file().ends_with(file) && check.line() == line)
 }
 
-/// What is measured, and the mistakes that are to be named, each with its place.
+/// Measurements, and the mistakes that are to be named, each with its place.
 type Case = (
     &'static str,
     fn() -> Finding,

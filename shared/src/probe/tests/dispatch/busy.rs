@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What everybody may see and touch.
+/// The desk that everybody may see and touch.
 #[derive(Default)]
 struct Desk {
     told: vec::Vec<Event>,

@@ -99,7 +99,7 @@ impl Monitor {
         self.answer = None;
     }
 
-    /// Whether samples come now: only while the finger is at rest before a slide, and slides.
+    /// Returns true if samples come now: only while the finger is at rest before a slide, and slides.
     pub(crate) fn is_sampling(&self) -> bool {
         matches!(self.status.phase, Phase::Background | Phase::Sliding)
     }
