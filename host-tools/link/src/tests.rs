@@ -156,24 +156,18 @@ impl Probe {
             Command::Identify(how) => vec![
                 Event::Phase(Phase::Sliding),
                 Event::Block(Block {
-                    number: 0,
                     still: true,
-                    steady: None,
                     pac: (0..BLOCK as i16).collect(),
-                    shear_mn: Default::default(),
-                    lost: 0,
+                    ..Block::default()
                 }),
                 Event::Verdict(Verdict {
                     texture: how.among[0],
                     name: Name::try_from("velcro").unwrap(),
                     probability: 0.995,
                     sure: true,
-                    unknown: false,
                     log_odds: Some(-7.5),
                     slides: 3,
-                    wants_label: false,
-                    changed: false,
-                    most_like: false,
+                    ..Verdict::default()
                 }),
                 Event::TextureLearned(TextureLearned {
                     name: Name::try_from("velcro").unwrap(),

@@ -272,7 +272,7 @@ pub struct Counts {
 }
 
 /// What one slide says.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct SlideReport {
     /// Values in the order of [`Property::ALL`].
     pub properties: [Option<f32>; 3],
@@ -325,7 +325,7 @@ impl From<&Measurement> for SlideReport {
 }
 
 /// What lies under the finger.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct Verdict {
     /// Index in the table.
     pub texture: u16,
@@ -375,7 +375,7 @@ pub struct TextureLearned {
 }
 
 /// What the rig is at.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct Live {
     /// Contact force by P_DC, mN.
     pub force_mn: i16,

@@ -156,12 +156,8 @@ fn what_is_not_of_the_probes_table_is_never_printed() {
             name: wire::text(name).as_str().try_into().unwrap(),
             probability: 0.999,
             sure: true,
-            unknown: false,
-            log_odds: None,
             slides,
-            wants_label: false,
-            changed: false,
-            most_like: false,
+            ..Verdict::default()
         })
     };
     let known = whole.name(3).unwrap();
@@ -172,12 +168,8 @@ fn what_is_not_of_the_probes_table_is_never_printed() {
             property: None,
         },
         observed: SlideReport {
-            properties: [None; 3],
-            roughness_is_bound: false,
             background: 1.0,
-            bands: Default::default(),
-            pressure: None,
-            pace: None,
+            ..SlideReport::default()
         },
         posterior: vec![0.0; textures].into_iter().collect(),
     };

@@ -29,11 +29,7 @@ where
 #[test]
 fn no_request_goes_on_without_an_end() {
     let live = Event::Live(wire::Live {
-        force_mn: 0,
-        steps: 0,
-        stage_um: 0,
-        speed_um_s: 0,
-        current_ma: 0,
+        ..wire::Live::default()
     });
     let (s, why) = goes_on(Request::status(), &live, 1);
     assert_eq!(s, 30);

@@ -5,11 +5,8 @@ use super::*;
 fn slide_report(change: impl FnOnce(&mut wire::SlideReport), posterior: &[f32]) -> Event {
     let mut observed = wire::SlideReport {
         properties: [Some(0.4), Some(3.0), None],
-        roughness_is_bound: false,
         background: 2.0,
-        bands: Default::default(),
-        pressure: None,
-        pace: None,
+        ..wire::SlideReport::default()
     };
     change(&mut observed);
     Event::SlideReport {
@@ -29,12 +26,9 @@ fn verdict(change: impl FnOnce(&mut Verdict)) -> Event {
         name: Name::try_from("cork").unwrap(),
         probability: 0.995,
         sure: true,
-        unknown: false,
         log_odds: Some(-7.5),
         slides: 3,
-        wants_label: false,
-        changed: false,
-        most_like: false,
+        ..Verdict::default()
     };
     change(&mut verdict);
     Event::Verdict(verdict)

@@ -80,11 +80,8 @@ fn exploration() -> Vec<Event> {
             action,
             observed: SlideReport {
                 properties: [Some(0.512), Some(5.25), None],
-                roughness_is_bound: false,
                 background: 1.0,
-                bands: Default::default(),
-                pressure: None,
-                pace: None,
+                ..SlideReport::default()
             },
             posterior: [0.05, 0.75, 0.15, 0.05].into_iter().collect(),
         },
@@ -139,12 +136,8 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         name: "Oak wood".try_into().unwrap(),
         probability: 0.995,
         sure: true,
-        unknown: false,
-        log_odds: None,
         slides: 1,
-        wants_label: false,
-        changed: false,
-        most_like: false,
+        ..Verdict::default()
     }));
     let mut monitor = heard(events.clone());
     assert!(
@@ -189,11 +182,8 @@ fn a_trace_reaches_both_ends_of_its_scale() {
         };
         Event::Block(Block {
             number,
-            still: false,
-            steady: None,
             pac: (0..64).map(sample).collect(),
-            shear_mn: Default::default(),
-            lost: 0,
+            ..Block::default()
         })
     });
     let monitor = heard(blocks);
@@ -294,12 +284,8 @@ fn what_was_stopped_is_shown_no_more() {
 #[test]
 fn between_slides_the_trace_is_said_to_be_the_last_ones() {
     let block = Event::Block(Block {
-        number: 0,
-        still: false,
-        steady: None,
         pac: (0..64).collect(),
-        shear_mn: Default::default(),
-        lost: 0,
+        ..Block::default()
     });
     let mut events = vec![Event::Phase(Phase::Sliding), block];
     let sliding = heard(events.clone());
