@@ -35,9 +35,6 @@ pub(crate) struct Options {
     /// Seeds of a part that takes them; each has its own default
     #[arg(long, value_name = "A-B", value_parser = range)]
     seeds: Option<RangeInclusive<u64>>,
-    /// Number of runs at a time; all cores unless given
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
     /// Finger of the emulated board in rig and handheld: biotac, analog or mems
     #[arg(long, value_name = "NAME", default_value = "biotac")]
     finger: String,
@@ -193,9 +190,6 @@ fn faults(seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
     let mut cases = emulate::program("faults");
     cases.args(["--faults", &count.to_string(), "--seed"]);
     cases.arg(seeds.start().to_string()).args(&options.options);
-    if let Some(jobs) = options.jobs {
-        cases.env("RAYON_NUM_THREADS", jobs.to_string());
-    }
     let mut lines = Vec::new();
     hear(&mut cases, |line| lines.push(line.to_owned()))?;
     Ok(sentence(&lines))
