@@ -201,12 +201,12 @@ fn start_caches() {
     });
 }
 
-/// What is wrong with the board, in words for the host.
+/// The fault of the board, in words for the host.
 pub(crate) fn flaw() -> Option<&'static str> {
     (!has_clock()).then_some(NO_CLOCK)
 }
 
-/// What is to be said of a board whose probe gives no clock.
+/// The sentence about a board whose probe gives no clock.
 const NO_CLOCK: &str =
     "no 8 MHz from the ST-LINK (see its solder bridges): runs by the chip's own clock, 1 % off";
 

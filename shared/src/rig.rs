@@ -41,7 +41,7 @@ pub type Enough<'a> = &'a mut dyn FnMut(&mut Slide<'_>) -> bool;
 /// A board, a simulator or a recording: it makes one movement and delivers the samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Rig {
-    /// Why a movement failed.
+    /// The reason why a movement failed.
     type Error;
 
     /// The properties that this rig can measure.

@@ -34,7 +34,7 @@
 //! | 4 | checksum of the table, its own last four bytes |
 //! | 4 | CRC-32 (ISO-HDLC) of these five |
 //! | 4 | free |
-//! | 4 | commit word `COMM`, of which up to three bits may be wrong, written when all else has been read back; anything else: no table, or one given up |
+//! | 4 | commit word `COMM`, with up to three wrong bits, written last; anything else: no table, or one given up |
 //! | | the table |
 //!
 //! # Words that are programmed again

@@ -12,31 +12,33 @@
 //! | 4 | magic `TACT` |
 //! | 2 | version, 1 |
 //! | 1 | contents, 0: Gaussians, 1: fused |
-//! | 1 | Gaussians: properties measured, a bit each: 1 traction, 2 roughness, 4 fineness; fused: place in `features::FeatureSet::ALL` |
+//! | 1 | Gaussians: a bit a property, 1 traction, 2 roughness, 4 fineness; fused: place in `FeatureSet::ALL` |
 //! | 4 | length of the whole table in bytes |
 //! | 2 | number of textures T, [`MAX_TEXTURES`] at most |
 //! | 1 | number of movements M |
 //! | 1 | Gaussians: 0; fused: number of features d |
 //! | 6 M | per movement: force in mN (2), speed in um/s (4) |
-//! | M (3 d + 2 d d) | fused only, per movement a [`Whitening`]: d means of the features (i16, 1/1024), binary places of d rows (u8), the rows of W (i16) |
-//! | 12 T M | Gaussians: per texture, movement and property: mean (i16, see [`mean_step`]), standard deviation (u16, [`SD_STEP`]); 0 and 0 for a property not measured |
+//! | M (3 d + 2 d d) | fused, per movement its [`Whitening`]: d means (i16, 1/1024), places of rows (u8), rows (i16) |
+//! | 12 T M | Gaussians: per texture, movement, property: mean (i16, [`mean_step`]), deviation (u16, [`SD_STEP`]) |
 //! | 2 d T M | fused: per texture and movement: mean of the d whitened features (i16, 1/256) |
 //! | T M | per texture and movement: number of trials, 255 for more |
 //! | 4 | CRC-32 of the table that this one was made from by learning, the first of all; 0 for none |
-//! | 5 T | per texture: a number that stays its own (2); slides that were learned from the factory, the user and itself (1 each, 255 for more) |
+//! | 5 T | per texture: its lasting number (2); slides from the factory, the user and itself (1 each, 255 for more) |
 //! | | per texture: length of its name (1), the name in UTF-8: see [`valid_name`] |
 //! | | sections, each its kind (2), the length of its contents (2), and these; an unknown kind is skipped |
 //! | 4 | CRC-32 (ISO-HDLC) of all before |
 //!
-//! Sections of a fused table; numbers are f32:
+//! The deviation is 0, as the mean, where a property was not measured.
+//!
+//! Sections of a fused table; numbers are f32. A tail is where the upper tenth of the scores begins, and its excess:
 //!
 //! | kind | bytes | what |
 //! |---|---|---|
 //! | 1 | 8 | the drift that is expected: [`Drift::bands`], [`Drift::traction`] |
 //! | | 4 M d/2, rounded up | per movement: variance of the drift along each two of the whitened axes |
-//! | 2 | 52 | [`Limits`]: the share of false alarms; of scores with drift after 1, 2, 3 slides, then without: begin and mean excess of their upper tenth |
-//! | | M (7 d + 2 d d) | per movement the [`Population`] of textures: axes as a whitening of whitened features, in their steps; d variances |
-//! | 4 | M (6 + 2 d) | per movement the [`Pace`] of slides: mean (i16, 1/1024) and variance of ln(speed), slope of all textures (d i16, 1/256) |
+//! | 2 | 52 | [`Limits`]: false alarms; tails of scores after 1, 2, 3 slides, with drift, then without |
+//! | | M (7 d + 2 d d) | per movement the [`Population`]: axes, a whitening of whitened features; d variances |
+//! | 4 | M (6 + 2 d) | per movement its [`Pace`]: mean (i16, 1/1024), variance, slope of all textures (d i16, 1/256) |
 //! | | 2 d T M | per texture and movement: its [`Slope`] |
 //!
 //! Section 3, of either kind of table, is for people: whether samples were moved between trials ([`Table::moved`]). Per
@@ -54,7 +56,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 2 | the length in ms at constant speed |
-//! | | as the table itself, learned from slides of this length: header to trials, a trial of 0 where a movement's slides are not longer |
+//! | | a table of slides of this length, header to trials; 0 trials where slides are not longer |
 //! | | the contents of section 1 and of section 2, where the table has these |
 //!
 //! Section 7, of a fused table, is what it did on textures that were left out of it, and on slides that it was not

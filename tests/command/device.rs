@@ -58,7 +58,7 @@ fn the_doctor_says_what_is_wrong_and_changes_nothing() {
     );
 }
 
-/// What lies under the finger is taught, renamed, forgotten; what the probe is told is what was meant.
+/// Teaches, renames and forgets the texture under the finger; the probe gets the commands that were meant.
 #[test]
 fn a_session_does_what_was_meant() {
     let bench = Bench::new(1000);

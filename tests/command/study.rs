@@ -209,7 +209,7 @@ fn confusion(a: (f64, f64), b: (f64, f64)) -> f64 {
     (2.0 * a.1 * b.1 / variances).sqrt() * (-(a.0 - b.0).powi(2) / (4.0 * variances)).exp()
 }
 
-/// What the rig cannot press is shown as that, and nothing else changes.
+/// Checks that a movement that is not reached is shown as that, and nothing else changes.
 #[test]
 fn a_movement_that_is_not_reached_is_a_result() {
     let grid: Vec<Movement> = Movement::grid().collect();

@@ -26,7 +26,7 @@ use crate::rigs::{assert_all, texture};
 /// Stop, lift, and the time until nobody waits any more.
 const RESTS_MS: u32 = 8000;
 
-/// What the probe said.
+/// The probe's words.
 #[derive(Default, Debug)]
 struct Heard {
     verdict: Option<Verdict>,
@@ -54,7 +54,7 @@ impl Host for Heard {
     }
 }
 
-/// What came of an exploration.
+/// The end of an exploration.
 #[derive(Debug)]
 struct Ended {
     done: Result<(), Failure>,

@@ -147,7 +147,7 @@ fn a_rig_slides_less_and_is_as_right() {
     assert!(worse(|s| s.wrong) <= 0.0, "more wrong when sure");
 }
 
-/// What a host hears that wants all samples.
+/// The reports to a host that wants all samples.
 #[derive(Default)]
 struct Heard(Vec<Event>);
 

@@ -197,7 +197,7 @@ fn features(set: FeatureSet, slide: &Observation) -> Vec<f64> {
     }
 }
 
-/// What the oracles say to the same runs.
+/// The oracles' verdicts on the same runs.
 fn oracle(experiment: &Experiment, set: FeatureSet, config: Config, runs: u64) -> Vec<Outcome> {
     // the table of a fixed experiment is the same in all runs, and so is the first choice
     let trained = |run: &Run<'_>| {

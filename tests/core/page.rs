@@ -32,7 +32,7 @@ fn probe(settings: &Value) -> (Session, Value) {
     (session, known)
 }
 
-/// What has happened until the probe is done.
+/// The events until the probe is done.
 fn happenings(session: &mut Session, ms: u32) -> Vec<Value> {
     let mut all = Vec::new();
     loop {

@@ -227,7 +227,7 @@ fn a_sprung_mount_holds_a_torn_finger_at_its_first_press() {
     assert!(without > 8.0, "{without:.2} N");
 }
 
-/// What one rig does from power-up to the second press.
+/// The work of one rig from power-up to the second press.
 struct Pressed {
     name: String,
     ready_s: f64,

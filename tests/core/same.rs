@@ -18,7 +18,7 @@ fn world() -> Collection {
     Collection::new(5, Collection::spread(47, 8), 5)
 }
 
-/// What a host hears, how the output was set, and for which false alarms the table in force is.
+/// The host's reports, the levels of the output, and the false alarms of the table in force.
 #[derive(Default)]
 struct Heard {
     events: Vec<Event>,
@@ -157,7 +157,7 @@ fn what_a_probe_cannot_verify_it_refuses_and_the_output_is_low() {
     assert_eq!(refused(&paper, 0), Failure::NoLimits);
 }
 
-/// How many of the table's textures, and of some that it does not have, are told as new within two slides.
+/// Number of the table's textures, and of some that it does not have, that are told as new within two slides.
 fn told_new(known: &(RigCalibration, Vec<u8>), set: Option<f32>) -> usize {
     let known_ones = world().textures;
     let others = (1..=117).filter(|texture| !known_ones.contains(texture));

@@ -298,7 +298,7 @@ fn the_skin_is_reported_worn_before_its_roughness_goes() {
     assert!(!rig.control().skin().is_worn());
 }
 
-/// What a user, or a broken host, may ask for.
+/// A request of a user, or of a broken host.
 #[derive(Clone, Debug)]
 enum Command {
     Home,

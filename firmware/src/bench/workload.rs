@@ -19,7 +19,7 @@ const CAPACITY: usize = tactus_core::table::MAX_TEXTURES;
 /// What is counted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Workload {
-    /// What counting itself takes.
+    /// The cost of counting itself.
     Nothing,
     /// Band-pass and mean power of the samples, in blocks.
     BandPower,
@@ -52,9 +52,9 @@ pub trait Counter {
 pub struct ObservedSlide {
     /// The method that decides.
     pub method: Method,
-    /// What is looked at.
+    /// The action that it was made for.
     pub action: Action,
-    /// What was measured.
+    /// The measured slide.
     pub slide: Observation,
 }
 

@@ -32,7 +32,7 @@ static mut LAST_WORDS: MaybeUninit<LastWords> = MaybeUninit::uninit();
 /// The pins are set up: lever and stage can be driven by hand.
 pub(crate) static ARMED: AtomicBool = AtomicBool::new(false);
 
-/// Why the chip started, and what the firmware said before; forgets both.
+/// Returns the cause of the chip's start, and the firmware's words before it; forgets both.
 pub(crate) fn reset_cause() -> (Reset, Option<Text>) {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));

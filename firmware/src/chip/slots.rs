@@ -177,7 +177,7 @@ struct Slots {
     /// Words were lost: who takes them sees where, as the next one is no good.
     gap: bool,
     begun: u32,
-    /// What is left to do of the slot, the transaction under way first.
+    /// The steps of the slot that are left, the transaction under way first.
     left: &'static [Step],
     /// The bytes of that one which have been sent, or none: it has not begun.
     sent: usize,
@@ -330,7 +330,7 @@ impl Slots {
         }
     }
 
-    /// What is under way has not ended in its time.
+    /// Gives up a transaction that has not ended in its time.
     #[cold]
     fn give_up(&mut self, step: &Step) {
         if self.sent > 0 {

@@ -57,7 +57,7 @@ const WAITS: u32 = u32::MAX;
 
 /// Words of an arm between two ticks: it says one in 50 ms.
 pub(super) const REPORTS: usize = 8;
-/// What the arm has said; what has no room is said again.
+/// The arm's words; those without a place in the queue are said again.
 pub(super) static HEARD: Channel<CriticalSectionRawMutex, ArmReport, REPORTS> = Channel::new();
 
 pub(crate) const fn unmeasured(finger: FingerName) -> RigCalibration {
@@ -201,13 +201,13 @@ impl Servo for ServoHandle {
     }
 }
 
-/// What every tick of a rig begins and ends with: words in, samples and the rig's state out, and the watchdog.
+/// The begin and the end of every tick of a rig: words in, samples and the rig's state out, and the watchdog.
 pub(super) struct Ticks {
     words: Consumer<'static, Word>,
     samples: Producer<'static, Samples>,
     ticker: Ticker,
     ended: Option<Ended>,
-    /// Why the watchdog is not petted any more once the rig is at rest.
+    /// The reason why the watchdog is not petted any more once the rig is at rest.
     pub(super) hung: Option<&'static str>,
     remembered: bool,
 }

@@ -67,7 +67,7 @@ pub(crate) async fn send(mut uart: BufferedUartTx<'static>) {
     }
 }
 
-/// What the probe runs on, for what is answered at any time.
+/// The body of a probe, for requests that are answered at any time.
 pub(crate) struct Body {
     pub(crate) state: fn() -> RigState,
     /// Stops it; whether all that was asked for.

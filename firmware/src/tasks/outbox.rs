@@ -8,7 +8,7 @@ use tactus_core::wire::{self, Event, MAX_FRAME, PROTOCOL, Report, Reset, Text};
 use super::level::OneLevel;
 use crate::chip::finger;
 
-/// What is on its way to the host: 66 ms of the line.
+/// Bytes on their way to the host: 66 ms of the line.
 const OUT: usize = 6144;
 
 pub(crate) static OUTBOX: Pipe<OneLevel, OUT> = Pipe::new();

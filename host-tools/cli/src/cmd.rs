@@ -77,7 +77,7 @@ and chooses each next movement so as to tell the remaining candidates apart (Bay
 
 This command runs the core of the firmware, the same code, on recordings and on a simulated rig.";
 
-/// What to try first, and what scripts need to know.
+/// The first commands to try, and notes for scripts.
 fn after_help() -> String {
     format!("{}\n\n{CONVENTIONS}", identify::FIRST_STEPS)
 }

@@ -46,30 +46,27 @@ enum Cli {
     Stack(stack_depth::Args),
 }
 
-fn run(cli: &Cli) -> Result<ExitCode> {
-    let met = |met| {
-        if met {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::FAILURE
-        }
-    };
+/// Runs it; false if a limit is missed.
+fn run(cli: &Cli) -> Result<bool> {
     match cli {
-        Cli::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
-        Cli::Handheld(args) => handheld::run(args).map(|()| ExitCode::SUCCESS),
-        Cli::Serve(args) => serve::run(args).map(|()| ExitCode::SUCCESS),
-        Cli::Faults(args) => faults::run(args).map(met),
-        Cli::Bench(args) => bench::run(args),
-        Cli::Stack(args) => stack_depth::run(args).map(|()| ExitCode::SUCCESS),
+        Cli::Identify(args) => identify::run(args)?,
+        Cli::Handheld(args) => handheld::run(args)?,
+        Cli::Serve(args) => serve::run(args)?,
+        Cli::Faults(args) => return faults::run(args),
+        Cli::Bench(args) => return bench::run(args),
+        Cli::Stack(args) => stack_depth::run(args)?,
     }
+    Ok(true)
 }
 
 /// The program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
-    run(&Cli::parse()).unwrap_or_else(|why| {
-        eprintln!("error: {why}");
-        ExitCode::FAILURE
-    })
+    match run(&Cli::parse()) {
+        Ok(true) => return ExitCode::SUCCESS,
+        Ok(false) => {}
+        Err(why) => eprintln!("error: {why}"),
+    }
+    ExitCode::FAILURE
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ use steps::Run;
 pub trait Operator: Person {
     /// Sees what a step has found; whether to go on, although it has not passed.
     fn found(&mut self, step: &Step, entry: &Entry) -> Result<bool, Trouble>;
-    /// What time it is, as 2026-11-24T19:30:00Z.
+    /// The time, as 2026-11-24T19:30:00Z.
     fn now(&self) -> String;
 }
 
@@ -41,7 +41,7 @@ pub enum Ends<'b> {
     Rig(&'b mut dyn Probe),
 }
 
-/// How far it went.
+/// The end of a bring-up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ended {
     /// All steps have passed.

@@ -32,7 +32,7 @@ pub enum PortError {
          can take: switch it off and on, then ask again"
     )]
     Endless {
-        /// What was asked for.
+        /// The request.
         request: String,
         /// Longest time that it takes.
         longest: Duration,

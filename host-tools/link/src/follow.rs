@@ -14,7 +14,7 @@ use tactus_core::wire::{
 /// Chip and PC do the same operations in the same order and agree to the bit; more than this apart they do not agree.
 pub const ALLOWED: f32 = 1e-4;
 
-/// Why a stretch of an exploration could not be compared. What follows is followed nevertheless.
+/// The reason why a stretch of an exploration could not be compared. The rest is followed nevertheless.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum FollowError {
     /// A report with samples was lost.
@@ -49,7 +49,7 @@ pub enum FollowError {
     Slide {
         /// Number of the slide.
         slide: u8,
-        /// Why they do not.
+        /// The reason why they do not.
         why: SlideError,
     },
     /// The explorer here refuses the slide that the probe reported.
@@ -68,13 +68,13 @@ pub enum FollowError {
 pub struct OtherChoice {
     /// Number of the slide.
     pub slide: u8,
-    /// What the probe chose.
+    /// The probe's choice.
     pub there: Action,
-    /// What is chosen here.
+    /// The choice here.
     pub here: Action,
 }
 
-/// How well probe and PC agree: largest absolute differences, infinite where one has a value and the other has none.
+/// The agreement of probe and PC: largest absolute differences, infinite where one has a value and the other has none.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Agreement {
     /// Slides whose features were computed again and compared.
@@ -138,7 +138,7 @@ pub struct Follower<'t> {
     looks: Vec<Result<Measurement, SlideError>>,
     /// The length at which it ended, from 1, where that was before its end.
     early: Option<u8>,
-    /// What the probe chose last.
+    /// The probe's last choice.
     chosen: Option<Action>,
     agreement: Agreement,
 }
@@ -171,7 +171,7 @@ impl<'t> Follower<'t> {
         })
     }
 
-    /// How well the two agree so far.
+    /// The agreement so far.
     pub fn agreement(&self) -> &Agreement {
         &self.agreement
     }
@@ -421,7 +421,7 @@ fn widen(largest: &mut f32, difference: f32) {
     *largest = largest.max(difference);
 }
 
-/// How far two values are apart; infinitely if only one is there or is a number.
+/// The distance of two values; infinite if only one is there or is a number.
 fn apart(here: Option<f32>, there: Option<f32>) -> f32 {
     match (here, there) {
         (None, None) => 0.0,

@@ -11,7 +11,7 @@ const MOVEMENT_S: u32 = 135;
 const TRIES: u32 = 2;
 /// Longest that a person takes for what the probe asks of them, s.
 const PERSON_S: u32 = 600;
-/// What moves nothing answers within this, s: five tries of 5 s, and some.
+/// Longest time to an answer without motion, s: five tries of 5 s, and some.
 const ANSWER_S: u32 = 30;
 /// A table is read or written within this, s: 128 KB by a line of 9600 baud.
 const TABLE_S: u32 = 300;

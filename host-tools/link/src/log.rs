@@ -27,9 +27,9 @@ pub enum Line<'a> {
         /// The probe's port.
         port: Cow<'a, str>,
     },
-    /// What the probe was asked for.
+    /// The probe's request.
     Command(Box<Cow<'a, Command>>),
-    /// What it said.
+    /// Its report.
     Report(Box<Cow<'a, Report>>),
 }
 
@@ -109,7 +109,7 @@ fn named(path: &Path, why: &io::Error) -> io::Error {
     io::Error::new(why.kind(), format!("{}: {why}", path.display()))
 }
 
-/// Why a log cannot be read.
+/// The reason why a log cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// A line is none of a log.
@@ -119,7 +119,7 @@ pub enum LogError {
     Line {
         /// Its number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The error.
         why: serde_json::Error,
     },
     /// A report that no probe makes.
@@ -127,7 +127,7 @@ pub enum LogError {
     Impossible {
         /// Its number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The error.
         what: &'static str,
     },
     /// Messages of another version.

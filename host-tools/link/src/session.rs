@@ -21,7 +21,7 @@ fn remedy(of: &u8) -> &'static str {
     }
 }
 
-/// Why a transaction failed, and what to do.
+/// The reason why a transaction failed, and the remedy.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum LinkError {
     /// The probe says why and what to do.
@@ -30,9 +30,9 @@ pub enum LinkError {
     /// The probe started anew before it answered.
     #[error("the probe restarted ({reset:?}) before it answered{}: ask again", quoted(.last_words))]
     Rebooted {
-        /// Why it did.
+        /// The cause of its restart.
         reset: Reset,
-        /// What the firmware had to say before it gave up.
+        /// The firmware's words before it gave up.
         last_words: Option<String>,
     },
     /// The other end is of another version.
@@ -122,7 +122,7 @@ pub struct Session {
     echo: Receiver,
     /// Bytes that were sent, and that came, as the poorest line carries them; each up to [`COMPARED`].
     carried: [Vec<u8>; 2],
-    /// Why nothing that comes in can be believed.
+    /// The reason why nothing that comes in can be believed.
     pub(crate) refused: Option<LinkError>,
 }
 

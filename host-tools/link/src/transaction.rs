@@ -8,7 +8,7 @@ use super::session::{LinkError, MAX_TRIES, Session};
 
 /// Requests that follow each other, and the outcome of all of them.
 pub trait Transaction {
-    /// What is known at the end.
+    /// The result at the end.
     type Outcome;
 
     /// The next request; `None` when all is done. Asked for once the last one is done.

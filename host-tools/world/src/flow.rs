@@ -42,16 +42,17 @@ const STOPS_NS: u64 = 600_000_000_000;
 const FLOATING: u8 = 0xFF;
 
 /// The surface under it.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum Ground {
     /// A surface with features, so many mm below.
     Seen(f64),
     /// A mirror or clear glass.
+    #[default]
     Glass,
 }
 
 /// The part.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Flow {
     noise: Noise,
     registers: BTreeMap<(u8, u8), u8>,
@@ -84,24 +85,9 @@ impl Flow {
         let repeat = REPEAT * noise.normal();
         Self {
             noise,
-            registers: BTreeMap::new(),
-            bank: 0,
             ground,
-            unplugged: false,
             repeat,
-            counts: 0.0,
-            frame_ns: 0,
-            frame_x_mm: 0.0,
-            at_ns: 0,
-            x_mm: 0.0,
-            moved_ns: 0,
-            ready_ns: 0,
-            access: Vec::new(),
-            latched: [0; 12],
-            spoiled: false,
-            last_ns: 0,
-            last_wrote: None,
-            refused: 0,
+            ..Self::default()
         }
     }
 

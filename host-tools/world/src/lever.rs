@@ -60,7 +60,7 @@ const STANDS_NS: u64 = 20_000_000;
 /// A motor that was faster than the start/stop rate and gets no step for this long has run past its stop.
 const OVERRUN_NS: u64 = 2_000_000;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Lever {
     step: Pin,
     dir: Pin,
@@ -132,17 +132,8 @@ impl Lever {
         let mut motor = Noise::new(world_seed, STREAM);
         let rotor = ((TOP_MM - height_mm) * 1e3 / STEP_UM).round();
         let mut lever = Self {
-            step: Pin::default(),
-            dir: Pin::default(),
-            enabled: false,
-            inverted: false,
-            coil_open: false,
             per_pulse: 1,
-            last_edge_stepped: false,
-            last_step_ns: None,
-            rate: 0.0,
             direction: 1,
-            stalled: false,
             standing: true,
             field: rotor as i64,
             rotor,
@@ -150,15 +141,9 @@ impl Lever {
             play_um: BACKLASH_UM,
             height_mm,
             error_phase: [motor.between(0.0, TAU), motor.between(0.0, TAU)],
-            at_top: false,
-            held: false,
-            vibration: Hum::SILENT,
             noise: Noise::new(trial_seed, STREAM),
             began_at: rotor,
-            asked: 0,
-            bad_pulses: 0,
-            lost_share: 0.0,
-            runaway: None,
+            ..Self::default()
         };
         lever.place_tip();
         lever
@@ -227,7 +212,7 @@ impl Lever {
             self.follow(load_n);
         } else {
             self.runaway = None;
-            self.vibration = Hum::SILENT;
+            self.vibration = Hum::default();
         }
     }
 
@@ -404,14 +389,15 @@ struct Tone {
     turn: [f64; 2],
 }
 
-impl Hum {
-    const SILENT: Self = Self(
-        [Tone {
-            at: [0.0, 0.0],
-            turn: [1.0, 0.0],
-        }; HUM_TONES],
-    );
+impl Default for Hum {
+    /// Silent.
+    fn default() -> Self {
+        let (at, turn) = ([0.0, 0.0], [1.0, 0.0]);
+        Self([Tone { at, turn }; HUM_TONES])
+    }
+}
 
+impl Hum {
     fn draw(noise: &mut Noise) -> Self {
         Self(std::array::from_fn(|_| {
             let per_tick = TAU * noise.between(HUM_HZ.0, HUM_HZ.1) * TICK_S;

@@ -11,6 +11,12 @@ use super::maths::{cos, exp, ln};
 #[derive(Clone, Debug)]
 pub struct Noise(ChaCha8Rng);
 
+impl Default for Noise {
+    fn default() -> Self {
+        Self::new(0, 0)
+    }
+}
+
 impl Noise {
     /// The stream number `stream` of `seed`; different streams have nothing in common.
     pub fn new(seed: u64, stream: u64) -> Self {

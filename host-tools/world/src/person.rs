@@ -84,7 +84,7 @@ impl Default for Manner {
 }
 
 /// A hand.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Hand {
     noise: Noise,
     manner: Manner,
@@ -119,21 +119,11 @@ impl Hand {
         Self {
             noise,
             manner,
-            force_n: 0.0,
-            pace_mm_s: 0.0,
             indentation_mm: -AIR_MM,
             x_mm,
-            speed_mm_s: 0.0,
-            wander: 0.0,
-            uneven: 0.0,
-            tremor: [0.0; 2],
             handle: Noise::new(seed, STREAM + 1),
-            shakes: [0.0; 2],
-            rubs: [0.0; 2],
-            leans: 0.0,
             lean: LEAN,
-            over: false,
-            turned: 0.0,
+            ..Self::default()
         }
     }
 

@@ -52,6 +52,7 @@ enum Reply {
 }
 
 /// The sensor's end of the bus.
+#[derive(Default)]
 pub struct SensorPeer {
     noise: Noise,
     electrodes: [f64; 19],
@@ -84,15 +85,8 @@ impl SensorPeer {
             electrodes,
             serial,
             powered_ns: Some(0),
-            pending: None,
-            ended_ns: 0,
-            streaming: false,
-            on: false,
-            quiet_ns: 0,
-            bytes: 0,
             line: [FLOATING; PROPERTY_LEN],
-            asked_property: false,
-            complaints: BTreeMap::new(),
+            ..Self::default()
         }
     }
 

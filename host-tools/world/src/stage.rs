@@ -90,7 +90,7 @@ pub(crate) const ADC_ERRORS: (f64, f64) = (8.0, 0.005);
 const STREAM: u64 = 0x57a6;
 
 /// The stage, its motor, its bridge and its amplifier.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Stage {
     duty: f64,
     /// the bridge's enable: without it the motor has no current and the stage coasts
@@ -139,26 +139,15 @@ impl Stage {
         let mut trial = Noise::new(trial_seed, STREAM);
         let position_mm = position_mm.clamp(0.0, TRAVEL_MM);
         let mut stage = Self {
-            duty: 0.0,
-            enabled: false,
-            jammed: false,
-            decays_fast: false,
-            resistor: None,
-            pushed_mm: None,
-            vibration_um: 0.0,
             position_mm,
             position_before_mm: position_mm,
-            speed_mm_s: 0.0,
-            current_a: 0.0,
-            limits: (false, false),
-            held: (false, false),
             friction_scale: 1.0 + FRICTION_SPREAD * trial.normal(),
             friction_phase: [stage.between(0.0, TAU), stage.between(0.0, TAU)],
             ripple_phase: stage.between(0.0, TAU),
             adc_offset: stage.between(-ADC_ERRORS.0, ADC_ERRORS.0),
             adc_gain: 1.0 + stage.between(-ADC_ERRORS.1, ADC_ERRORS.1),
             noise_seed: trial.uniform().to_bits(),
-            along: Along::default(),
+            ..Self::default()
         };
         stage.along = stage.along();
         stage.switch_limits();

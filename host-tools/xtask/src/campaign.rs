@@ -35,9 +35,6 @@ pub(crate) struct Options {
     /// Seeds of a part that takes them; each has its own default
     #[arg(long, value_name = "A-B", value_parser = range)]
     seeds: Option<RangeInclusive<u64>>,
-    /// Number of runs at a time; all cores unless given
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
     /// Finger of the emulated board in rig and handheld: biotac, analog or mems
     #[arg(long, value_name = "NAME", default_value = "biotac")]
     finger: String,
@@ -63,8 +60,6 @@ enum Part {
     Handheld,
     /// The PC's simulated rig, which breaks at any moment of whatever its probe does
     Faults,
-    /// The same on emulated boards, with the firmware
-    BoardFaults,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
     Press,
     /// libFuzzer against frames, tables, the store's flash, recordings, samples, logs and the page's probe, on stable
@@ -82,7 +77,7 @@ impl Part {
         let usual = match self {
             Self::Press => 1..=100,
             Self::Rig | Self::Handheld => 1..=20,
-            Self::Faults | Self::BoardFaults => 1..=300,
+            Self::Faults => 1..=300,
             _ => return None,
         };
         Some(options.seeds.clone().unwrap_or(usual))
@@ -170,18 +165,12 @@ fn perform(part: Part, options: &Options) -> Result<String> {
     match (part, seeds) {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
         (Part::Tests, _) => left_out(),
-        (Part::Faults | Part::BoardFaults, Some(seeds)) => faults(part, &seeds, options),
+        (Part::Faults, Some(seeds)) => faults(&seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
         (Part::Press, Some(seeds)) => seeds::presses(&seeds),
         (_, Some(seeds)) => seeds::run(part == Part::Handheld, &seeds, options),
         (_, None) => Ok(String::new()),
     }
-}
-
-fn result(emulator: &mut Command) -> Result<String> {
-    let mut lines = Vec::new();
-    hear(emulator, |line| lines.push(line.to_owned()))?;
-    Ok(sentence(&lines))
 }
 
 /// Of a report's lines, those with verdicts, and the last one that is a sentence and no row, path or list.
@@ -195,27 +184,15 @@ fn sentence(lines: &[String]) -> String {
     all.join(" ")
 }
 
-fn faults(part: Part, seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
+fn faults(seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
     let count = seeds.end() - seeds.start() + 1;
-    let numbers = [("--faults", count), ("--seed", *seeds.start())];
-    let numbers = numbers.map(|(name, number)| [name.into(), number.to_string().into()]);
-    let all: Vec<OsString> = numbers
-        .into_iter()
-        .flatten()
-        .chain(options.options.iter().cloned())
-        .collect();
-    let mut cases = if part == Part::BoardFaults {
-        emulate::command("faults", &all)?
-    } else {
-        run(&mut emulate::build())?;
-        let mut cases = emulate::program("faults");
-        cases.args(all);
-        cases
-    };
-    if let Some(jobs) = options.jobs {
-        cases.env("RAYON_NUM_THREADS", jobs.to_string());
-    }
-    result(&mut cases)
+    run(&mut emulate::build())?;
+    let mut cases = emulate::program("faults");
+    cases.args(["--faults", &count.to_string(), "--seed"]);
+    cases.arg(seeds.start().to_string()).args(&options.options);
+    let mut lines = Vec::new();
+    hear(&mut cases, |line| lines.push(line.to_owned()))?;
+    Ok(sentence(&lines))
 }
 
 /// Runs every test with every seed, the ignored ones too, but for those that are a part of their own.

@@ -82,8 +82,7 @@ enum Cli {
     /// Builds with the active Rust toolchain if that has the target thumbv7em-none-eabihf
     /// (`rustup target add thumbv7em-none-eabihf`). If it has not, Debian's Rust packages build it, and where those are
     /// missing too, root gets them installed by apt-get.
-    #[command(after_help = size::EXAMPLES)]
-    Size(size::Options),
+    Size,
     /// Build the firmware and flash it to the board (NUCLEO-F429ZI) with probe-rs
     ///
     /// Tables and settings that the board has stored stay: they are in sectors of their own.
@@ -116,7 +115,7 @@ fn main() -> ExitCode {
         Cli::Campaign(options) => campaign::campaign(&options),
         Cli::Evidence(options) => python::evidence(&options),
         Cli::Bench(options) => bench::bench(&options),
-        Cli::Size(options) => size::size(&options),
+        Cli::Size => size::size(),
         Cli::Flash(options) => flash::flash(&options),
         Cli::Page => page::page(),
         Cli::Docs(options) => docs::docs(&options),

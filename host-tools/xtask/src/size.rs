@@ -4,7 +4,6 @@ mod panics;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use clap::Args;
 use serde_json::Value;
 
 use panics::{Kind, Panic, panics};
@@ -12,11 +11,6 @@ use panics::{Kind, Panic, panics};
 use crate::emulate;
 use crate::firmware::{self, Size};
 use crate::shell::run;
-
-pub(crate) const EXAMPLES: &str = "\
-Examples:
-  cargo xtask size                   all of it
-  cargo xtask size --no-stack        without the exploration on the emulated board, which takes some minutes";
 
 const KB: u64 = 1024;
 /// Flash of an image, with all tables that come with it: half of the bank that it has, so that compilers have room.
@@ -31,13 +25,6 @@ const STACK: u64 = 192 * KB - MAX_VARIABLES - 16 * KB;
 const MOVING: [&str; 3] = ["tactus-rig", "tactus-arm", "tactus-handheld"];
 const RIG: &str = "tactus-rig";
 
-#[derive(Args, Default)]
-pub(crate) struct Options {
-    /// Leave the stack out, and with it the emulated board
-    #[arg(long)]
-    no_stack: bool,
-}
-
 struct Measured {
     name: String,
     size: Size,
@@ -45,30 +32,22 @@ struct Measured {
     stack: Option<u64>,
 }
 
-/// The sizes with the stack, and an error if one is over its limit.
-pub(crate) fn gates() -> Result<()> {
-    size(&Options::default())
-}
-
-pub(crate) fn size(options: &Options) -> Result<()> {
-    let images = measure(options.no_stack)?;
+/// Prints the sizes with the stack; an error if one is over its limit.
+pub(crate) fn size() -> Result<()> {
+    let images = measure()?;
     print!("{}", text(&images));
     let wrong = wrong(&images);
     ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
     Ok(())
 }
 
-fn measure(no_stack: bool) -> Result<Vec<Measured>> {
+fn measure() -> Result<Vec<Measured>> {
     let mut images = Vec::new();
     for elf in firmware::elves()? {
         let name = firmware::name(&elf)?.to_owned();
         let bytes = std::fs::read(&elf).with_context(|| elf.display().to_string())?;
         eprintln!("{}  {}", firmware::hash(&bytes), firmware::shown(&elf));
-        let stack = if name == RIG && !no_stack {
-            Some(stack(&elf)?)
-        } else {
-            None
-        };
+        let stack = (name == RIG).then(|| stack(&elf)).transpose()?;
         images.push(Measured {
             panics: panics(&bytes).with_context(|| name.clone())?,
             size: Size::of(&bytes).with_context(|| name.clone())?,

@@ -31,7 +31,7 @@ const ROWS: [&[Step]; 2] = [
         ("page", page::check),
         ("python", python::check),
         ("bench", bench::gates),
-        ("size", size::gates),
+        ("size", size::size),
         ("licences", licences),
     ],
 ];

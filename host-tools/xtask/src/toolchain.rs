@@ -87,7 +87,8 @@ fn help(target: Target) -> String {
 Install one of:
   with rustup         rustup target add {}
   Debian 12, as root  apt-get update
-                      apt-get install --no-install-recommends rustc-web cargo-web rust-web-src rust-web-llvm lld-22 llvm-22
+                      apt-get install --no-install-recommends rustc-web cargo-web rust-web-src \
+                      rust-web-llvm lld-22 llvm-22
   newer Debian        apt-get install --no-install-recommends rustc cargo rust-src lld   (Rust 1.95 or newer)
 and run the command again.",
         target.triple
@@ -155,7 +156,7 @@ pub(crate) fn host_build(folder: &Path) -> Command {
     cargo
 }
 
-/// What every such build gets, then these.
+/// The flags of every such build, then these.
 pub(crate) fn rustflags() -> OsString {
     let mut flags = OsString::from("-Dwarnings");
     let mut leave_out = |folder: &Path, name: &str| {
@@ -196,7 +197,7 @@ fn debian_cargo() -> Command {
     cargo
 }
 
-/// What Debian's toolchain lacks to build for another target, if anything.
+/// The part that Debian's toolchain lacks to build for another target, if any.
 fn debian_lacks() -> Option<String> {
     if !Path::new(DEBIAN_CARGO).exists() {
         return Some(format!("there is no {DEBIAN_CARGO}"));

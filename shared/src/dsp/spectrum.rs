@@ -85,7 +85,7 @@ const fn band_of() -> [u8; BINS - 1] {
     bands
 }
 
-/// What the sum of the powers of a band's bins is multiplied by for their mean in counts^2.
+/// Factors that make the sums of the powers of the bands' bins their means in counts^2.
 const SHARES: [f32; FUSED_BANDS] = shares();
 
 #[allow(clippy::indexing_slicing)] // the compiler runs it, and has no iterators

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What an exploration says of its only candidate.
+/// The comparison with the only candidate of an exploration.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Verification {
     /// ln of how much likelier the slides are of another texture, whichever, than of this one.
@@ -10,7 +10,7 @@ pub struct Verification {
     /// Score above which it is another one: as many of the slides of this one are above it as
     /// [`Config::false_alarm`](super::Config::false_alarm) says.
     pub limit: f32,
-    /// What to tell.
+    /// The answer.
     pub answer: Answer,
 }
 

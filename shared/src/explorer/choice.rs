@@ -17,7 +17,7 @@ use crate::table::{Action, Gaussian, MAX_ACTIONS};
 /// exploration.
 const TRIES: u8 = 2;
 
-/// What an action is expected to bring.
+/// The expected outcome of an action.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ExpectedOutcome {
     /// The action.

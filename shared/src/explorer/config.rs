@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// its probability, all of 117 by about 2e-4. They are not reported either.
 pub const NEGLIGIBLE: f32 = 1e-6;
 
-/// How slides are compared with the table.
+/// The comparison of slides with the table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub enum Method {
     /// The paper's: one property per slide, Gaussians (eq. 4).
@@ -56,7 +56,7 @@ impl Method {
     }
 }
 
-/// How the next movement is chosen.
+/// The choice of the next movement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub enum Strategy {
     /// The action of the greatest benefit (eq. 12).
@@ -68,12 +68,12 @@ pub enum Strategy {
     Random,
 }
 
-/// How to choose, and when to stop.
+/// The choice of movements, and the end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
-    /// How slides are compared with the table.
+    /// The comparison of slides with the table.
     pub method: Method,
-    /// How the next movement is chosen.
+    /// The choice of the next movement.
     pub strategy: Strategy,
     /// A texture more probable than this is the answer.
     pub threshold: f32,
@@ -114,7 +114,7 @@ impl Config {
     pub const PAIR_THRESHOLD: f32 = 0.999;
 }
 
-/// Why an exploration cannot begin.
+/// The reason why an exploration cannot begin.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum ExplorerError {
     /// The table has more textures than the explorer has room for.
@@ -154,7 +154,7 @@ fn wrong_table(method: &Method, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     }
 }
 
-/// Why a slide was not used. The exploration stands as it was.
+/// The reason why a slide was not used. The exploration stands as it was.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, thiserror::Error)]
 pub enum ObserveError {
     /// The slide has no such property, or it is not a finite number.

@@ -10,7 +10,7 @@ use super::posterior::{Explorer, LEAST};
 use crate::features::Observation;
 use crate::table::Action;
 
-/// What the first part of a slide says, after the slides before it.
+/// The first part of a slide, after the slides before it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Look {
     /// The most probable texture.

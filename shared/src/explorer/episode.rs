@@ -68,7 +68,7 @@ impl MovementSums {
     }
 }
 
-/// What the probe can learn from an exploration, until the next one begins.
+/// The result of an exploration, from which the probe can learn until the next one begins.
 #[derive(Clone, Debug)]
 pub struct EpisodeSummary {
     /// Checksum of the table that was explored with.

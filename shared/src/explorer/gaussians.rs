@@ -17,7 +17,7 @@ pub(super) struct LiveGaussian {
     pub(super) mean: f32,
     /// Its variance, in such a unit that distances are in steps of [`OVERLAP`].
     pub(super) variance: f32,
-    /// What it contributes to a degree of confusion by its standard deviation alone.
+    /// Its contribution to a degree of confusion by its standard deviation alone.
     pub(super) root: f32,
 }
 
@@ -51,7 +51,7 @@ pub(super) struct LiveTexture {
     pub(super) probability: f32,
     /// Sum over all others of confusion times probability: the numerator of eq. 8.
     pub(super) confused: f32,
-    /// What is expected of the properties looked at, those first.
+    /// The expectations of the properties looked at, those first.
     pub(super) expected: [Gaussian; Property::ALL.len()],
 }
 

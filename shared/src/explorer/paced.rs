@@ -74,7 +74,7 @@ fn numbers(bytes: &[u8], features: usize) -> White {
     numbers
 }
 
-/// How far a mean of slides at this pace is from that of a texture of this slope; 0 beyond the features.
+/// Distance of a mean of slides at this pace from that of a texture of this slope; 0 beyond the features.
 fn apart(mean: &Vector, known: &White, slope: &White, pace: i16) -> White {
     let mut apart = White::default();
     let known = known.iter().zip(slope);

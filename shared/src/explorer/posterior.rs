@@ -20,7 +20,7 @@ use crate::up_to;
 pub(super) const OUT: i32 = -(5 << 28);
 /// Logarithms of candidates are never below, those of others always.
 pub(super) const LEAST: i32 = -(1 << 30);
-/// What is left of a candidate's when the greatest is 0: however improbable, it stays one.
+/// Least logarithm of a candidate beside a greatest of 0: however improbable, it stays one.
 const FLOOR: i32 = -(1 << 28);
 /// Log-odds for "none of these" over which a texture counts as unknown, after one slide and after more (the recipe has
 /// 2 and 0). In simulated worlds 21 to 24 a limit of 0 takes one in fifteen known textures for a new one; 1.5 rather
@@ -172,7 +172,7 @@ impl<'t, const N: usize> Explorer<'t, N> {
         self.table
     }
 
-    /// How it explores.
+    /// Its configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }

@@ -9,7 +9,7 @@ const KNOWN: f32 = 1000.0;
 /// Halvings of the range in which the degrees of freedom are looked for: down to the digits of an f32.
 const HALVINGS: usize = 40;
 
-/// What the variances of all textures have in common at one movement, for one property.
+/// The common part of the variances of all textures at one movement, for one property.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ShrinkagePrior {
     pub(super) freedom: f32,
@@ -61,7 +61,7 @@ impl ShrinkagePrior {
         (self.freedom * self.variance + own * sd * sd) / (self.freedom + own)
     }
 
-    /// What the mean of `slides` slides is expected to be: the own mean is uncertain as well.
+    /// The expectation of the mean of `slides` slides: the own mean is uncertain as well.
     pub(super) fn expect(&self, known: Gaussian, trials: u8, slides: u8) -> Gaussian {
         let share = 1.0 / f32::from(slides.max(1)) + 1.0 / f32::from(trials.max(1));
         Gaussian {

@@ -168,7 +168,7 @@ fn any_cells() -> impl proptest::strategy::Strategy<Value = Vec<Vec<[(f32, f32);
     })
 }
 
-/// What an explorer says of itself.
+/// The state of an explorer.
 fn state<const N: usize>(
     explorer: &mut Explorer<'_, N>,
 ) -> (

@@ -116,11 +116,11 @@ fn told(calibration: &RigCalibration) -> Event {
 pub struct Probe<'m, R, F, B, E> {
     /// The rig.
     pub rig: R,
-    /// What it knows.
+    /// Its memory.
     pub memory: Memory<'m, F, B>,
     /// Who hears what it does.
     pub events: E,
-    /// What every slide needs.
+    /// The coefficients of every slide.
     pub plan: &'m Plan,
 }
 

@@ -32,7 +32,7 @@ impl Random {
     }
 }
 
-/// What an exploration does, as it does it; `E` is why a rig failed.
+/// A step of an exploration; `E` is the rig's error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ExplorationStep<'a, E> {
     /// This action comes next; the slice has the expected outcomes of all actions.
@@ -58,7 +58,7 @@ pub enum ExplorationStep<'a, E> {
     CutShort(&'a Verdict, u8),
 }
 
-/// Why an exploration ended without an answer.
+/// The reason why an exploration ended without an answer.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 pub enum ExploreError<E> {
     /// The rig failed, and a person is needed.

@@ -28,7 +28,7 @@ struct Wear {
     erased: u32,
 }
 
-/// What a probe knows.
+/// The memory of a probe.
 pub struct Memory<'m, F, B> {
     /// Or why it could not be opened.
     store: Result<Store<F>, StoreError>,
@@ -211,7 +211,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         }
     }
 
-    /// Why there is no table in force, or another one than was stored last.
+    /// The reason why there is no table in force, or another one than was stored last.
     pub fn trouble(&self) -> Option<&MemoryError> {
         self.length.as_ref().err().or(self.instead.as_ref())
     }
@@ -221,7 +221,7 @@ impl<'m, F: NorFlash, B: StoredBytes<F>> Memory<'m, F, B> {
         self.store.as_mut().map_err(|why| MemoryError::Broken(*why))
     }
 
-    /// What learning needs; [`Memory::reload`] is due after it.
+    /// Lends the parts that learning needs; [`Memory::reload`] is due after it.
     #[inline(never)]
     pub(super) fn lend(&mut self) -> Result<Lent<'_, F>, MemoryError> {
         let distrusted = self.distrusted;

@@ -26,7 +26,7 @@ pub struct UnloadedRun {
 /// A [`Rig`] that a probe owns: besides its movements it homes, is calibrated, and shows its state.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait RigHandle: Rig<Error = RigError> {
-    /// What the rig is doing now.
+    /// The rig's state.
     fn state(&self) -> RigState;
 
     /// Something new begins: another sample may lie under the finger, and `seed` says where on it slides begin.
@@ -97,15 +97,15 @@ pub trait Events {
     fn go(&mut self, _on: bool) {}
 }
 
-/// What is answered at any time, whatever the probe is busy with.
+/// Answers at any time, whatever the probe is busy with.
 pub trait Panel {
-    /// What the rig is doing now.
+    /// The rig's state.
     fn rig(&self) -> RigState;
 
     /// The table in force, see [`Events::table`].
     fn table(&self) -> TableInUse;
 
-    /// What acquisition and link have counted since boot.
+    /// The counts of acquisition and link since boot.
     fn counts(&self) -> Counts;
 
     /// The finger of the probe.

@@ -21,7 +21,7 @@ use crate::rig::{Ended, Enough, Phase, Refused, Rig, RigError, most_mn};
 use crate::store::Store;
 use crate::wire::{Event, Failure, MemoryError, Prompt};
 
-/// How often the samples are looked after, ms.
+/// Interval of the looks at the samples, ms.
 pub const LOOK_MS: u32 = 10;
 const _: () = assert!(LOOK_MS * LOOKS_HZ == 1000);
 /// While a finger is turned over so much may press on it, mN: a hand takes it off its mount, and its tip's weight
@@ -30,7 +30,7 @@ const TURNED_MN: u16 = 1000;
 /// A weight is waited for as long, looks.
 const PATIENCE: u32 = 60 * LOOKS_HZ;
 
-/// What the servo shall do.
+/// A command to the servo.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum RigCommand {
     /// Lifts the finger to its limit switch, and leaves the stage alone.
@@ -118,7 +118,7 @@ impl RigCommand {
 /// A tick's samples, or some of them.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Samples {
-    /// What they belong to.
+    /// The phase that they belong to.
     pub sample_phase: SamplePhase,
     /// P_AC, counts about the still finger's.
     pub pac: Vec<i16, 8>,
@@ -155,7 +155,7 @@ impl Samples {
     }
 }
 
-/// What runs [`Control`], and hands on its samples.
+/// The runner of [`Control`], which hands on its samples.
 #[allow(async_fn_in_trait)] // no executor of this project moves tasks between threads
 pub trait Servo {
     /// True if it has a stage of ours, whose motor's current is the shear; otherwise an arm moves the finger.
@@ -204,7 +204,7 @@ pub trait Servo {
     fn tell(&mut self, event: Event);
 }
 
-/// What a person is asked to do to a lifted finger, and what came of it so far.
+/// A task of a person at a lifted finger, and its result so far.
 enum PersonTask {
     /// To lay a weight of so many mN on it: counts above the air. It is over when the weight was taken away again.
     Weight(u16, Weighing, Option<f32>),

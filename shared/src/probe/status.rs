@@ -7,14 +7,14 @@ use crate::rig::skin::SkinCare;
 use crate::rig::{Ended, Phase};
 use crate::wire::{Event, Live};
 
-/// What the rig is doing, as of its last tick.
+/// The state of the rig, as of its last tick.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RigState {
     /// Its phase.
     pub phase: Phase,
     /// The finger is lifted and the stage stands.
     pub at_rest: bool,
-    /// How the last movement ended, until the next command.
+    /// The end of the last movement, until the next command.
     pub ended: Option<Ended>,
     /// Contact force, mN.
     pub force_mn: f32,
@@ -33,7 +33,7 @@ pub struct RigState {
     pub calibration: RigCalibration,
     /// True if movements may press with up to 2 N.
     pub high_force: bool,
-    /// What the skin has been through.
+    /// The wear of the skin.
     pub skin: SkinCare,
 }
 

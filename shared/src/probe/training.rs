@@ -40,7 +40,7 @@ pub fn pilot_movements(most_mn: u16) -> impl Iterator<Item = Movement> {
 pub struct Wanted<'n> {
     /// Its name. One that the table knows goes on with the trials that it has there.
     pub name: &'n str,
-    /// How often each movement is to have been made in the end.
+    /// Wanted number of trials of each movement.
     pub trials: u8,
     /// [`pilot_movements`] instead of the table's.
     pub pilot: bool,

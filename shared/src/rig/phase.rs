@@ -19,9 +19,10 @@ pub const fn most_mn(high_force: bool) -> u16 {
 }
 
 /// The phases of the rig.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Phase {
     /// The rig does nothing; the positions of lever and stage are unknown until it homes.
+    #[default]
     Parked,
     /// The lever, then the stage look for their limit switches.
     Homing,

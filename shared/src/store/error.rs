@@ -8,7 +8,7 @@ use super::layout::{SCHEMA, UNITS};
 use crate::rig::calibration::RigCalibrationError;
 use crate::table::TableError;
 
-/// What a flash did not do.
+/// A failure of a flash.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 #[allow(missing_docs)] // their texts say it
 pub enum FlashFault {
@@ -30,7 +30,7 @@ impl<E: NorFlashError> From<E> for FlashFault {
     }
 }
 
-/// Why the store did not do what it was told. Its order is that of the messages: new ones go to the end.
+/// The reason why the store refused. Its order is that of the messages: new ones go to the end.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, thiserror::Error)]
 #[allow(missing_docs)] // their texts say it
 pub enum StoreError {
@@ -48,7 +48,7 @@ pub enum StoreError {
     Unfinished { got: usize, wanted: usize },
     #[error("reading the table back takes {0} bytes")]
     Buffer(usize),
-    /// What was written does not read as a table.
+    /// The written bytes do not read as a table.
     #[error(transparent)]
     Table(TableError),
     #[error("the flash does not keep what was written: its sector is worn out")]
@@ -90,7 +90,7 @@ impl From<SettingsError> for StoreError {
     }
 }
 
-/// Why settings cannot be used.
+/// The reason why settings cannot be used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 #[allow(missing_docs)] // their texts say it
 pub enum SettingsError {
@@ -106,7 +106,7 @@ pub enum SettingsError {
     Record(Setting),
 }
 
-/// What a record is about. Its words say what to do without it.
+/// The subject of a record. Its words say what to do without it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, thiserror::Error)]
 #[allow(missing_docs)] // their texts say it
 pub enum Setting {

@@ -94,7 +94,7 @@ pub(super) struct Slots {
     pub(super) usable: [u32; 4],
     /// The slot in use, and the table in it: the newest of them.
     pub(super) active: Option<(Slot, StoredTable)>,
-    /// Why the newest table that was committed is none any more: the one before it is in use, or none.
+    /// The reason why the newest committed table is none any more: the one before it is in use, or none.
     pub(super) damaged: Option<TableError>,
     /// Largest generation that any slot has had.
     pub(super) generation: u32,
@@ -166,7 +166,7 @@ pub(super) fn correct_header(bytes: &mut [u8; HEADER]) {
     }
 }
 
-/// What is done to the header of a committed slot before it is read.
+/// The change of the header of a committed slot before it is read.
 pub(super) type Correct = fn(&mut [u8; HEADER]);
 
 pub(super) fn header(table: &StoredTable) -> [u8; HEADER] {

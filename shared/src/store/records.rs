@@ -23,7 +23,7 @@ pub const SELF_MOVEMENTS: usize = 2;
 pub(super) const KEY_SCHEMA: u8 = 0;
 /// The calibration of rig and finger.
 pub(super) const KEY_CALIBRATION: u8 = 1;
-/// How far the finger has slid, and the work that the skin has seen.
+/// The way of the finger, and the work that the skin has seen.
 pub(super) const KEY_SKIN: u8 = 2;
 /// The share of false alarms that the probe's limits are for.
 pub(super) const KEY_FALSE_ALARM: u8 = 3;
@@ -38,7 +38,7 @@ pub(super) const KEYS: usize = KEY_SELF as usize + MAX_TEXTURES;
 /// bands, 141 and 190.
 pub(super) const RECORD: usize = 192;
 
-/// How far the training of a texture at one movement has come.
+/// The progress of the training of a texture at one movement.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct TrainingRecord {
     /// The texture.
@@ -47,7 +47,7 @@ pub struct TrainingRecord {
     pub movement: Movement,
     /// Checksum of the table whose trials of this texture are counted in; `None` for trials of its own only.
     pub table: Option<u32>,
-    /// What was learned.
+    /// The statistics so far.
     pub stats: TrainingStats,
 }
 
@@ -95,7 +95,7 @@ impl Record for SelfLearnedRecord {
     }
 }
 
-/// What the probe has learned by itself of a texture, in place of what the table says of it at these movements.
+/// The probe's own learning of a texture, in place of the table's statistics at these movements.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct SelfLearnedRecord {
     /// [`crate::table::Table::lineage`] of the table: what is learned later does not change it.

@@ -24,7 +24,7 @@ use crate::table::{MAX_TEXTURES, TrainingStats, is_false_alarm};
 /// A record is stored so often at most: three wrong bits can be in the way of three.
 const TRIES: u8 = 4;
 
-/// How a place for a record is used, as a new record sees it.
+/// The use of a place for a record, for a new record.
 #[derive(Clone, Copy, PartialEq)]
 enum Use {
     Free,

@@ -275,7 +275,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// What the header of a slot says, and the version of its layout, if it is one.
+    /// The contents of a slot's header, and the version of its layout, if it is one.
     async fn slot_header(
         &mut self,
         slot: Slot,

@@ -105,7 +105,7 @@ pub(crate) fn known(slides: u8, mean: &[f64]) -> Whitened {
     known
 }
 
-/// What was learned of a texture at two movements of two features.
+/// Statistics of a texture at two movements of two features.
 const NEW: [Whitened; 2] = {
     let mut mean = [0; crate::features::MAX_FEATURES];
     (mean[0], mean[1]) = (9 * 256, 9 * 256);

@@ -177,9 +177,10 @@ pub enum Reset {
 }
 
 /// What the rig does: [`crate::rig::Phase`] without its fault.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub enum Phase {
     /// It does not know where it is.
+    #[default]
     Parked,
     /// It looks for its limit switches.
     Homing,
@@ -220,7 +221,7 @@ impl From<crate::rig::Phase> for Phase {
 }
 
 /// How the probe is.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct Status {
     /// What the rig does.
     pub phase: Phase,
@@ -271,7 +272,7 @@ pub struct Counts {
 }
 
 /// What one slide says.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct SlideReport {
     /// Values in the order of [`Property::ALL`].
     pub properties: [Option<f32>; 3],
@@ -324,7 +325,7 @@ impl From<&Measurement> for SlideReport {
 }
 
 /// What lies under the finger.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct Verdict {
     /// Index in the table.
     pub texture: u16,
@@ -374,7 +375,7 @@ pub struct TextureLearned {
 }
 
 /// What the rig is at.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, Default)]
 pub struct Live {
     /// Contact force by P_DC, mN.
     pub force_mn: i16,

@@ -2,9 +2,8 @@
 
 use std::io::{Read as _, Write as _};
 
-use tactus_core::sensor::FingerCode;
 use tactus_core::table::{Action, Table, factory};
-use tactus_core::wire::{self, Command, Counts, Event, Failure, MAX_FRAME, Phase, Receiver};
+use tactus_core::wire::{self, Command, Event, Failure, MAX_FRAME, Phase, Receiver};
 use tactus_core::wire::{PART, Report, Request, SlideReport, Status, Verdict};
 
 use super::software::line;
@@ -43,21 +42,16 @@ fn probe(answers: impl Fn(&Request) -> Vec<Event> + Send + 'static) -> Scratch {
 fn status() -> Status {
     Status {
         phase: Phase::Ready,
-        fault: None,
         textures: 3,
         table_bytes: 900,
         table_crc: 7,
-        factory: false,
         calibrated: 20_261_121,
-        counts: Counts::default(),
         skin_mj: (1, 1),
-        false_alarm: None,
-        high_force: false,
-        finger: FingerCode::BIOTAC,
+        ..Status::default()
     }
 }
 
-/// What a line makes of bytes.
+/// A line's effect on bytes.
 type Carries = fn(&[u8]) -> Vec<u8>;
 
 /// A port that sends back what comes so.
@@ -162,12 +156,8 @@ fn what_is_not_of_the_probes_table_is_never_printed() {
             name: wire::text(name).as_str().try_into().unwrap(),
             probability: 0.999,
             sure: true,
-            unknown: false,
-            log_odds: None,
             slides,
-            wants_label: false,
-            changed: false,
-            most_like: false,
+            ..Verdict::default()
         })
     };
     let known = whole.name(3).unwrap();
@@ -178,12 +168,8 @@ fn what_is_not_of_the_probes_table_is_never_printed() {
             property: None,
         },
         observed: SlideReport {
-            properties: [None; 3],
-            roughness_is_bound: false,
             background: 1.0,
-            bands: Default::default(),
-            pressure: None,
-            pace: None,
+            ..SlideReport::default()
         },
         posterior: vec![0.0; textures].into_iter().collect(),
     };

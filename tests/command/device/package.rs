@@ -7,7 +7,7 @@ use tactus_lab::sim::collection::texture_name;
 
 use super::software::{Bench, UNKNOWN};
 
-/// What a user would write: everything that moves, at a probe of three textures with the second one under its finger.
+/// A user's session: everything that moves, at a probe of three textures with the second one under its finger.
 const SESSION: &str = "
 import json, sys
 import numpy, tactus

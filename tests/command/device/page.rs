@@ -25,7 +25,7 @@ struct Page {
     began: Instant,
 }
 
-/// What a page got until its probe was done.
+/// A page's frames until its probe was done.
 #[derive(Default)]
 struct Got {
     said: String,

@@ -73,7 +73,7 @@ impl Bench {
         self.at.error(&Self::line(line), 1)
     }
 
-    /// What came since this was asked for last.
+    /// The commands since the last call.
     pub(super) fn asked(&self) -> Vec<wire::Command> {
         self.asked.try_iter().collect()
     }

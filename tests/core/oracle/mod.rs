@@ -94,7 +94,7 @@ pub struct Trained {
     pub movements: Vec<Whitener>,
     /// Whitened means as `[texture][movement][feature]`.
     pub means: Vec<Vec<Vec<f64>>>,
-    /// How many slides a mean stands for, as `[texture][movement]`.
+    /// Number of slides behind each mean, as `[texture][movement]`.
     pub counts: Vec<Vec<f64>>,
 }
 
@@ -233,10 +233,10 @@ pub fn uncertainty(posterior: &[f64], confusion: &Matrix) -> f64 {
     (1.0 - rest.sum::<f64>()).max(0.0)
 }
 
-/// What the slides of one movement say, within one episode.
+/// The slides of one movement, within one episode.
 #[derive(Clone, Debug, Default)]
 pub struct Made {
-    /// How many there were: k.
+    /// Their number: k.
     pub slides: u32,
     /// Their whitened mean; empty while there is none.
     pub mean: Vec<f64>,

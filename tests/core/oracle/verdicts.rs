@@ -263,7 +263,7 @@ impl Judge {
         })
     }
 
-    /// What is told after slides of this mean, and the most probable texture.
+    /// The verdict after slides of this mean, and the most probable texture.
     pub fn tell(&self, z: &[f64], k: usize, alpha: f64) -> (VerdictKind, usize) {
         let surprises = self.surprises(z, k, 0);
         let least = surprises.iter().copied().fold(f64::INFINITY, f64::min);

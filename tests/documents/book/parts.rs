@@ -288,7 +288,7 @@ fn rows(of: &Expr) -> Vec<Vec<Expr>> {
     }
 }
 
-/// What an expression says in words: a string itself, a constant's string, or the expression.
+/// The words of an expression: a string itself, a constant's string, or the expression.
 fn said(of: &Expr, folder: &str) -> String {
     match of {
         Expr::Lit(value) => match &value.lit {

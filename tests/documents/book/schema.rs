@@ -14,7 +14,7 @@ use tactus_core::wire::{MAX_MESSAGE, PROTOCOL};
 use super::parts::{doc, is_sent};
 use super::{files, read};
 
-/// What frames hold: requests and reports of a probe, questions and answers of the self-test.
+/// The contents of frames: requests and reports of a probe, questions and answers of the self-test.
 const ROOTS: [&str; 4] = ["Request", "Report", "Ask", "Answer"];
 /// Numbers and texts as postcard has them; `usize` is as long as the longer end's.
 const PLAIN: [&str; 12] = [
@@ -102,7 +102,7 @@ impl Sources {
         one
     }
 
-    /// What a path means in a file: defined there, brought there, or the only one of its name.
+    /// The meaning of a path in a file: defined there, brought there, or the only one of its name.
     fn resolve(&self, path: &syn::Path, from: usize) -> At {
         let mut words: Vec<String> = path.segments.iter().map(|s| s.ident.to_string()).collect();
         let name = words.last().cloned().unwrap_or_default();
@@ -206,7 +206,7 @@ impl Schema {
         holds.unwrap_or_else(|| json!({ "tuple": [] }))
     }
 
-    /// What fields are on the line: nothing, one type, a tuple, or a struct.
+    /// The form of fields on the line: nothing, one type, a tuple, or a struct.
     fn fields(
         &mut self,
         of: &Fields,

@@ -104,11 +104,11 @@ pub(crate) struct Args {
 
 #[derive(Serialize)]
 struct Identification {
-    /// What was presented.
+    /// The presented texture.
     presented: String,
-    /// Whether the table holds it.
+    /// True if the table holds it.
     known: bool,
-    /// Whether the answer is right; `null` where it is undecided.
+    /// True if the answer is right; `null` where it is undecided.
     right: Option<bool>,
     /// Textures of the table.
     textures: u16,
@@ -117,7 +117,7 @@ struct Identification {
     max_slides: u8,
     seed: u64,
     slides: Transcript,
-    /// Whether it ended for want of recordings.
+    /// True if it ended for want of recordings.
     recordings_ran_out: bool,
     verdict: Answer,
     /// With a table: slides that it was learned from, and that were left out.

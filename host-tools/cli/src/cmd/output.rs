@@ -9,7 +9,7 @@ pub(crate) use tactus_lab::eval::show::percent;
 use tactus_lab::eval::verdicts::Verdicts;
 use tactus_lab::eval::verified::{self, Verified};
 
-/// How a command ended that did what it was to do.
+/// The end of a command that did its work.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Done {
     /// With all that was asked for.
@@ -19,7 +19,7 @@ pub(crate) enum Done {
 }
 
 impl Done {
-    /// Whether a sample was found to be the same.
+    /// Fully, if the sample was found to be the same.
     pub(crate) fn of(verified: &Verified) -> Self {
         if verified.answer == verified::name(Answer::Same) {
             Self::Fully

@@ -15,7 +15,7 @@ pub(crate) fn be_quiet() {
     let _ = QUIET.set(());
 }
 
-/// Whether nothing is to be shown but results and errors.
+/// Returns true if only results and errors are shown.
 pub(crate) fn is_quiet() -> bool {
     QUIET.get().is_some()
 }

@@ -18,7 +18,6 @@ use super::log::Log;
 use super::pins::{self, PinId};
 use super::referee::Referee;
 use super::rig::{SharedRig, lock};
-use super::timing::{SLOT_COUNT, Timing};
 use super::upset::Switch;
 
 const SPI1_CR1: u64 = 0x4001_3000;
@@ -55,7 +54,6 @@ pub(crate) struct Driver {
     pub(crate) reached: Sender<u64>,
     pub(crate) log: Option<Log>,
     pub(crate) profiler: Option<HandlerProfiler>,
-    pub(crate) timing: Timing,
     /// instructions since power-up, without the time that the core slept
     pub(crate) instructions: u64,
     pub(crate) tick_ns: u64,
@@ -94,13 +92,12 @@ impl Driver {
 
     /// Brings the levels of a port's outputs to the rig.
     fn port(&mut self, board: &mut Board, now_ns: u64, port: usize) {
-        let mut command_ends = false;
         let rig = self.rig.clone();
         let mut rig = lock(&rig);
         let mut at = |pin: PinId| (pin.port() == port).then(|| board.level(pin));
         for (part, pin) in (0..).zip([pins::SENSOR_CS, pins::SENSOR_CS_2]) {
-            if at(pin).is_some_and(|high| rig.select_part(now_ns, part, !high)) {
-                command_ends = true;
+            if let Some(high) = at(pin) {
+                rig.select_part(now_ns, part, !high);
             }
         }
         if let Some(high) = at(pins::MOTION_CS) {
@@ -126,10 +123,6 @@ impl Driver {
         if pins::STAGE_PWM.port() == port {
             let level = by_port(board, pins::STAGE_PWM, pins::TIM3_4_FUNCTION);
             rig.stage_port(now_ns, level);
-        }
-        let now = VirtualNanos(now_ns);
-        if command_ends && let Ok(count) = board.part.read(now, SLOT_COUNT, Width::W32) {
-            self.timing.command(count);
         }
     }
 
@@ -373,9 +366,6 @@ impl emulator::Driver<Board> for Driver {
         }
         if let (Settled::Access { access, .. }, Some(referee)) = (&settled, &mut self.referee) {
             referee.access(access);
-        }
-        if let Settled::Access { access, .. } = &settled {
-            self.timing.access(access);
         }
         match settled {
             Settled::Access { access, .. } if access.kind == AccessKind::Write => {

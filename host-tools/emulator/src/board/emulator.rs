@@ -26,7 +26,6 @@ use super::pins::{self, PinId};
 use super::referee::{Referee, Violation};
 use super::rig::{Rig, SharedRig, lock};
 use super::symbols::symbols;
-use super::timing::Timing;
 use super::upset::Switch;
 
 /// A reset of the chip.
@@ -78,7 +77,6 @@ impl Emulator {
             reached: reaches,
             log,
             profiler: None,
-            timing: Timing::default(),
             instructions: 0,
             tick_ns: options.tick_ns.max(1),
             next_tick_ns: 0,
@@ -445,11 +443,6 @@ impl Emulator {
             let profiler = standing.driver.profiler.as_ref();
             profiler.map_or(0, |profiler| profiler.instructions)
         })
-    }
-
-    /// Punctuality of slots and servo since the last call.
-    pub(crate) fn timing(&mut self) -> Result<Timing, Error> {
-        self.with(|standing| std::mem::take(&mut standing.driver.timing))
     }
 
     /// The address and the size, in bytes, of the one symbol that has `name` as its path or in it.

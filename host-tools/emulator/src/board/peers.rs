@@ -15,11 +15,11 @@ impl Store for Serial {}
 
 impl uart::Peer for Serial {
     fn receive(&mut self, word: u16, context: &mut Timeline<'_, '_>) {
-        lock(&self.0).hear(context.now().0, word as u8);
+        lock(&self.0).heard.push((context.now().0, word as u8));
     }
 
-    fn transmit(&mut self, now: VirtualNanos) -> Option<u16> {
-        lock(&self.0).say(now.0).map(u16::from)
+    fn transmit(&mut self, _now: VirtualNanos) -> Option<u16> {
+        lock(&self.0).to_say.pop_front().map(u16::from)
     }
 }
 

@@ -8,7 +8,6 @@ use tactus_world::parts::ClockMode;
 use tactus_world::world::{Setup, World};
 
 use super::display::Display;
-use super::line::LineNoise;
 use super::motion::MotionPeer;
 use super::options::Options;
 use super::record::{Recorder, Slide, Touch};
@@ -75,8 +74,6 @@ pub struct Rig {
     pub(super) selected_ns: u64,
     /// bytes of this select so far, and the time of the last one
     bytes: u32,
-    /// the first of them was a sample command
-    commanded: bool,
     pub(super) byte_ns: u64,
     /// last bit of MISO, for a wrong clock phase
     bit: u8,
@@ -95,8 +92,6 @@ pub struct Rig {
     pub(crate) heard: Vec<(u64, u8)>,
     /// To the firmware.
     pub(crate) to_say: VecDeque<u8>,
-    /// On the line between the two.
-    line: Option<LineNoise>,
 }
 
 impl std::fmt::Debug for Rig {
@@ -131,7 +126,6 @@ impl Rig {
             selected: None,
             selected_ns: 0,
             bytes: 0,
-            commanded: false,
             byte_ns: 0,
             bit: 1,
             sensor_wired: false,
@@ -147,7 +141,6 @@ impl Rig {
             tone: None,
             heard: Vec::new(),
             to_say: VecDeque::new(),
-            line: None,
         }
     }
 
@@ -305,14 +298,13 @@ impl Rig {
         }
     }
 
-    /// Chip select of a part falls, or rises. Returns true if a sample command ends with it.
-    pub(crate) fn select_part(&mut self, now_ns: u64, part: u8, selected: bool) -> bool {
+    /// Chip select of a part falls, or rises.
+    pub(crate) fn select_part(&mut self, now_ns: u64, part: u8, selected: bool) {
         let is_there = usize::from(part) < fastest_byte_ns(self.finger).len();
         if !is_there || selected == (self.selected == Some(part)) {
-            return false;
+            return;
         }
         self.selected = selected.then_some(part);
-        let commanded = std::mem::take(&mut self.commanded);
         if selected {
             self.selected_ns = now_ns;
             self.bytes = 0;
@@ -321,7 +313,6 @@ impl Rig {
         } else {
             self.world.spi_deselect(now_ns);
         }
-        commanded
     }
 
     /// Connects the pins to SPI1, and to TIM4, or not.
@@ -365,7 +356,6 @@ impl Rig {
         };
         if first && samples {
             self.commands += 1;
-            self.commanded = true;
             self.recorder.command(self.selected_ns);
         }
         if too_fast || self.spi_control & CR1_LSB_FIRST != 0 {
@@ -393,29 +383,6 @@ impl Rig {
         self.advance_to(now_ns);
         let x_mm = self.world.hand().map(|hand| hand.x_mm());
         self.motion.byte(now_ns, x_mm.unwrap_or(0.0), mosi, bits)
-    }
-
-    /// Disturbs the line to the host until a time: this share of the bytes, either way, has a wrong bit or is lost.
-    pub(crate) fn disturb_line(&mut self, share: f64, until_ns: u64, seed: u64) {
-        self.line = Some(LineNoise::new(share, until_ns, seed));
-    }
-
-    fn on_the_line(&mut self, now_ns: u64, byte: u8) -> Option<u8> {
-        match &mut self.line {
-            Some(noise) => noise.pass(now_ns, byte),
-            None => Some(byte),
-        }
-    }
-
-    pub(crate) fn hear(&mut self, now_ns: u64, byte: u8) {
-        if let Some(byte) = self.on_the_line(now_ns, byte) {
-            self.heard.push((now_ns, byte));
-        }
-    }
-
-    pub(crate) fn say(&mut self, now_ns: u64) -> Option<u8> {
-        let byte = self.to_say.pop_front()?;
-        self.on_the_line(now_ns, byte)
     }
 
     /// The encoder's lines after its next edge up to the time reached.

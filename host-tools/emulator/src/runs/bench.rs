@@ -6,19 +6,15 @@ mod gates;
 mod inputs;
 mod on_the_rig;
 mod row;
-pub mod slowed;
 #[path = "../../../../firmware/src/bench/workload.rs"]
 pub mod workload;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use anyhow::bail;
 use clap::Args as Arguments;
-use serde_json::Value;
 use tactus_core::explorer::Method;
 use tactus_core::sensor::FingerName;
-use tactus_core::wire::Identify;
 
 use self::counter::Bench;
 use self::gates::{GATES, gate};
@@ -26,7 +22,7 @@ use self::inputs::{SLIDE, extremes, observed, of_gates, slide};
 use self::on_the_rig::on_the_rig;
 use self::row::{Row, print};
 use self::workload::Workload;
-use crate::host::args::{Firmware, Format};
+use crate::host::args::Firmware;
 
 /// What is counted.
 #[derive(Arguments)]
@@ -40,86 +36,46 @@ pub(crate) struct Args {
     /// The finger that the rig's image is for; of another one than a BioTac, the rig alone is measured
     #[arg(long, value_name = "NAME", default_value_t = FingerName::Biotac, requires = "rig")]
     finger: FingerName,
-    /// For people, or JSON for programs
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
 }
 
-/// An exploration of one slide, the same each time.
-fn one_slide() -> Identify {
-    Identify {
-        threshold: 1.0,
-        max_slides: 1,
-        open: false,
-        seed: 1,
-        ..Identify::default()
-    }
-}
-
-/// Exit code when gates are missed and every result is right. `cargo xtask test` knows it.
-const MISSED: u8 = 2;
 const DIFFERENT: &str = "not what the plain kernels give: ";
 
-/// Counts, and says by its exit code whether every gate is met.
-pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let met = count(args)?;
-    Ok(if met {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(MISSED)
-    })
-}
-
-fn count(args: &Args) -> anyhow::Result<bool> {
-    let text = args.format == Format::Text;
+/// Counts and prints; true if every gate is met.
+pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     if let Some(rig) = args
         .rig
         .as_ref()
         .filter(|_| args.finger != FingerName::Biotac)
     {
         let rows = on_the_rig(rig, args.finger)?;
-        if text {
-            print(&rows, "one of the simulated rig");
-        } else {
-            println!("{}", Value::from_iter(rows.iter().map(Row::json)));
-        }
+        print(&rows, "one of the simulated rig");
         return Ok(rows.iter().all(Row::ok));
     }
     let mut bench = Bench::start(&args.firmware.elf)?;
     extremes(&mut bench)?;
     let (samples, source) = slide()?;
     let mut rows = kernels(&mut bench, &samples)?;
-    let mut slow = None;
     if let Some(rig) = &args.rig {
         rows.extend(on_the_rig(rig, args.finger)?);
-        slow = Some(slowed::slowed(rig, slowed::WORST_RATIO * slowed::RESERVE));
         let is_counted = |name: &str| rows.iter().any(|row| row.kernel == name);
         if let Some((name, ..)) = GATES.iter().find(|(name, ..)| !is_counted(name)) {
             bail!("{name}: it has a gate and was not counted");
         }
     }
-    if text {
-        print(&rows, source);
-        if let Some(slowed) = &slow {
-            slowed::print(slowed);
-        }
-    } else {
-        println!("{}", Value::from_iter(rows.iter().map(Row::json)));
-    }
+    print(&rows, source);
     let different = rows.iter().filter(|row| !row.equal);
     let different: Vec<&str> = different.map(|row| row.kernel.as_str()).collect();
     if !different.is_empty() {
         bail!(DIFFERENT.to_owned() + &different.join("; "));
     }
-    let in_time = slow.is_none_or(|slowed| slowed::missed(&slowed).is_empty());
-    Ok(in_time && rows.iter().all(Row::ok))
+    Ok(rows.iter().all(Row::ok))
 }
 
 /// A kernel that is to be counted: its work, and what it is held against.
 struct Kernel<'a> {
     name: String,
     unit: &'static str,
-    /// How many of them the work has.
+    /// Number of them in the work.
     units: usize,
     cmsis: Option<f64>,
     floor: Option<f64>,
@@ -148,7 +104,7 @@ impl<'a> Kernel<'a> {
         }
     }
 
-    /// What CMSIS-DSP takes in an expert's hands.
+    /// The count of CMSIS-DSP in an expert's hands.
     fn cmsis(self, cmsis: f64) -> Self {
         Self {
             cmsis: Some(cmsis),

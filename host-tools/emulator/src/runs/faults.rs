@@ -1,11 +1,7 @@
-//! The campaign of faults: many cases, each by its seed, side by side, on the simulated rig of the PC or on emulated
-//! boards.
-
-pub mod board;
+//! The campaign of faults: many cases, each by its seed, side by side, on the simulated rig of the PC.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 
 use clap::Args as Arguments;
 use rayon::prelude::*;
@@ -14,11 +10,9 @@ use tactus_lab::eval::show::count;
 use tactus_lab::sim::fault_case::naming::Naming;
 use tactus_lab::sim::fault_case::{Bench, Case, Outcome};
 
-use self::board::{BoardBench, BoardCase};
 use crate::host::progress;
 
-/// Breaks one to three things at any moment of whatever the probe does, case by case: on the simulated rig of the PC,
-/// or with --elf on emulated boards, whose link, supply and debugger break, too.
+/// Breaks one to three things at any moment of whatever the probe does, case by case, on the simulated rig of the PC.
 ///
 /// The probe homes, identifies, learns, calibrates or rests meanwhile. Then bits of its flash change while its power is
 /// off, everything is repaired, and it works again. Limits: never more than 2.2 N on the finger, a rig at rest with its
@@ -35,43 +29,26 @@ pub(crate) struct Args {
     /// Without the spring of the finger's mount, which the list of parts asks for
     #[arg(long)]
     stiff: bool,
-    /// Run on emulated boards with this firmware
-    #[arg(long, value_name = "PATH")]
-    elf: Option<PathBuf>,
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     let bar = progress::bar("cases", args.faults, ", {eta} left");
     let bench = Bench::new(factory::RIG)?;
-    let board = args.elf.as_ref();
-    let board = board.map(|elf| BoardBench::new(elf, &bench.calibration));
-    let board = board.transpose()?;
     let seeds = args.seed..args.seed.saturating_add(args.faults);
     let cases = seeds.into_par_iter().map(|seed| {
-        let (what, ended) = match &board {
-            Some(board) => {
-                let mut drawn = BoardCase::draw(seed);
-                drawn.case.stiff = args.stiff;
-                let ended = board.run(&drawn).map_err(|why| why.to_string());
-                (format!("{drawn:?}"), ended)
-            }
-            None => {
-                let case = Case {
-                    stiff: args.stiff,
-                    ..Case::draw(seed)
-                };
-                let ended = catch_unwind(AssertUnwindSafe(|| bench.run(&case)));
-                let ended = ended.map_err(|_| "it panicked".to_owned());
-                let ended = ended.and_then(|ended| ended.map_err(|why| why.to_string()));
-                (format!("{case:?}"), ended)
-            }
+        let case = Case {
+            stiff: args.stiff,
+            ..Case::draw(seed)
         };
+        let ended = catch_unwind(AssertUnwindSafe(|| bench.run(&case)));
+        let ended = ended.map_err(|_| "it panicked".to_owned());
+        let ended = ended.and_then(|ended| ended.map_err(|why| why.to_string()));
         let wrong = match &ended {
             Ok(outcome) => outcome.wrong.join("; "),
             Err(why) => why.clone(),
         };
         if !wrong.is_empty() {
-            bar.suspend(|| println!("  seed {seed} FAILED: {wrong}\n    {what}"));
+            bar.suspend(|| println!("  seed {seed} FAILED: {wrong}\n    {case:?}"));
         }
         bar.inc(1);
         ended

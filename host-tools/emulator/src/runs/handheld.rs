@@ -19,7 +19,7 @@ use crate::host::under_finger;
 /// The firmware's table is of this world.
 const WORLD: u64 = 1;
 const NO_VERDICT: &str = "the display shows no verdict";
-/// How the slides are meant: as the display asks for them.
+/// Intended force of the slides, as the display asks for it.
 const FORCE_N: f64 = 0.5;
 const PACE_MM_S: f64 = 25.0;
 /// Slides until there must be a verdict: ten that count, and three times as many that are made again.
@@ -89,7 +89,7 @@ fn slide_s(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What the display says in the end.
+/// The display's last words.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum VerdictKind {
     Sure(&'static str),
@@ -192,7 +192,7 @@ fn milestones(board: &Emulator, seen: &[(u64, Seen)]) -> Milestones {
     times
 }
 
-/// What the firmware told its host meanwhile, against the world.
+/// The firmware's reports to its host, against the world.
 struct Heard {
     /// Of each slide, by how much of the world's mean force the firmware's is off: means over the same time.
     force_errors: Vec<f64>,

@@ -27,7 +27,7 @@ pub(crate) struct Args {
     arm_port: Option<u16>,
 }
 
-/// How far the board runs between two looks at the socket, ms.
+/// Interval of the looks at the socket, ms.
 const STEP_MS: u64 = 1;
 
 /// Gives the line to whoever connects last, until the process ends.

@@ -14,7 +14,7 @@ use crate::faults::identify;
 
 /// Speeds of the runs without load, mm/s.
 const SPEEDS: [f64; 4] = [10.0, 25.0, 40.0, 63.0];
-/// What the motor's current may be off by: traction needs it, A.
+/// Largest error of the motor's current, which traction needs, A.
 const NEEDED_A: f64 = 0.005;
 
 /// Mean of what is seen while the stage goes to the right at a speed.

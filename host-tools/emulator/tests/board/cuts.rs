@@ -46,7 +46,7 @@ const TRIALS: u64 = 100;
 /// After so many cuts of an operation the probe homes and identifies as well.
 const PROBED: usize = 2;
 
-/// What the firmware holds, by its own account.
+/// The firmware's contents, by its own account.
 #[derive(Clone, PartialEq, Debug)]
 struct Held {
     /// Checksum and bytes of the table in force, with what the probe has learned by itself.
@@ -59,7 +59,7 @@ struct Held {
     skin_mj: (u32, u32),
 }
 
-/// What is left by a cut: the state from before, one of several records, or the state from after.
+/// The state after a cut: that from before, one of several records, or that from after.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Left {
     Old,
@@ -84,7 +84,7 @@ struct Operation {
     /// The store before it, and what the firmware does to it.
     before: Vec<u8>,
     writes: Vec<FlashWrite>,
-    /// What may be held after a cut, the oldest first.
+    /// States that are right after a cut, the oldest first.
     states: Vec<Held>,
     /// Cuts: every word, unless it turns a page.
     cuts: usize,
@@ -235,7 +235,7 @@ fn begin(talk: &mut Talk) -> (Vec<u8>, Held) {
     (talk.board().store().unwrap(), held(talk))
 }
 
-/// What was stored since.
+/// The records stored since.
 fn noted(
     name: &'static str,
     talk: &mut Talk,

@@ -27,7 +27,7 @@ fn store() -> Vec<u8> {
     unpacked(&here.join("../../tests/golden/store.bin.gz"))
 }
 
-/// What the golden store holds.
+/// The contents of the golden store.
 struct Held {
     /// Where the newest table begins.
     newest_at: usize,

@@ -14,7 +14,7 @@ use tactus_world::world::Setup;
 use crate::broken_code::{Instead, break_code};
 use crate::common::{elf, ready};
 
-/// What breaks.
+/// A cause.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Cause {
     Rig(Fault),
@@ -40,7 +40,7 @@ struct Case {
     name: &'static str,
     cause: Cause,
     when: When,
-    /// What may be reported; nothing where the firmware itself goes down.
+    /// Reports that are right; none where the firmware itself goes down.
     seen: &'static [Seen],
     /// From the fault to the stage's brake and to the first step up, ms; `None` where the lever itself is at fault, and
     /// steps are no measure.
@@ -247,7 +247,7 @@ pub(crate) fn is_time(when: When, board: &mut Emulator) -> bool {
     }
 }
 
-/// What came of a fault.
+/// The outcome of a fault.
 #[derive(Debug, Default)]
 struct Outcome {
     seen: Option<Seen>,
@@ -351,7 +351,7 @@ fn run(case: &Case, talk: &mut Talk, random: &mut ChaCha8Rng) -> Outcome {
     outcome
 }
 
-/// What the pins did since a fault.
+/// Reads the pins' changes since a fault.
 fn look(board: &mut Emulator, since_ns: u64, outcome: &mut Outcome) {
     let rig = board.rig();
     let ms = |at_ns: u64| at_ns.saturating_sub(since_ns) as f64 * 1e-6;
@@ -377,7 +377,7 @@ fn look(board: &mut Emulator, since_ns: u64, outcome: &mut Outcome) {
     }
 }
 
-/// What a fault must not come to; an empty list is good.
+/// The objections to the end of a fault; an empty list is good.
 fn objections(case: &Case, outcome: &Outcome) -> Vec<String> {
     let mut objections = Vec::new();
     if outcome.force_max_n > 2.2 {

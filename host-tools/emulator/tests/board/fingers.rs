@@ -74,7 +74,7 @@ fn mems_boots_and_identifies() {
     boots_and_identifies(FingerName::Mems);
 }
 
-/// What is told in so long a time: faults, and sentences.
+/// Faults and sentences told in so long a time.
 fn told(talk: &mut Talk, until_s: f64) -> (Vec<Fault>, Vec<String>) {
     let (mut faults, mut sentences) = (Vec::new(), Vec::new());
     while (talk.now_ns() as f64) < until_s * 1e9 {

@@ -6,7 +6,7 @@ use tactus_emulator::board::{Emulator, Output};
 use crate::common::elf;
 use crate::faults::{When, board, identify, is_time};
 
-/// How long the core is halted.
+/// Duration of the halt, ms.
 const HALTED_MS: u64 = 700;
 
 /// When the lever made steps, ns.

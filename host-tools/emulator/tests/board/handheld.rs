@@ -76,7 +76,7 @@ fn it_sleeps_between_samples_and_when_nobody_wants_any() {
     assert!((0.0..0.02).contains(&resting), "{resting}");
 }
 
-/// What the firmware says of its sleep against the instructions that the emulated core has executed.
+/// Compares the firmware's account of its sleep with the instructions that the emulated core has executed.
 #[test]
 #[ignore = "long"]
 fn the_share_of_time_awake_is_true() {

@@ -28,7 +28,7 @@ const BURLAP: u8 = 101;
 pub(crate) struct Held {
     pub(crate) talk: Talk,
     pub(crate) person: Person,
-    /// What the person was asked to do, once each time that it changed.
+    /// Requests to the person, one for each time that they changed.
     prompts: Vec<Prompt>,
     pub(crate) reports: Vec<Report>,
 }
@@ -174,7 +174,7 @@ impl Held {
             .unwrap();
     }
 
-    /// What holds of every run: no slot late, no word lost, no reset, no frame damaged.
+    /// Checks that hold of every run: no slot late, no word lost, no reset, no frame damaged.
     pub(crate) fn end(mut self) {
         let counts = self.status().counts;
         assert_eq!(

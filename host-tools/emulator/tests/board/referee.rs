@@ -7,7 +7,7 @@ use tactus_emulator::board::referee::{Rule, Violation};
 use tactus_emulator::board::{Emulator, Options};
 use tactus_world::world::Setup;
 
-/// What a small firmware does: one access each.
+/// The work of a small firmware: one access each.
 #[derive(Clone, Copy)]
 enum Do {
     /// Stores a word, a half-word, a byte.
@@ -89,7 +89,7 @@ fn load_half(operation: u16, register: u16, number: u16) -> [u16; 2] {
     [first, second]
 }
 
-/// What the referee says of a firmware that does this.
+/// The referee's verdicts on a firmware that does this.
 fn judged(name: &str, steps: &[Do]) -> Vec<Violation> {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("referee-{name}.elf"));
     std::fs::write(&path, elf(steps)).unwrap();

@@ -59,7 +59,7 @@ fn the_lever_waits_between_current_and_its_first_step() {
     rig.world().clear();
 }
 
-/// What came of an exploration in which a switch went off while the finger slid.
+/// The outcome of an exploration in which a switch went off while the finger slid.
 #[derive(Debug)]
 struct Outcome {
     ended: Result<(), TalkError>,

@@ -31,7 +31,7 @@ const LOOKED: u64 = 5;
 const TOO_EARLY: u8 = 0x2D;
 const NOT_ASKED: u8 = 0x5F;
 
-/// What the sensor complained of, and the commands that it got.
+/// The sensor's complaints, and the commands that it got.
 fn heard(board: &mut Emulator) -> (Vec<(u8, u64)>, u64) {
     let mut rig = board.rig();
     let complaints = rig.world().sensor().complaints().clone();

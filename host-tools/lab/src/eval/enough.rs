@@ -16,7 +16,7 @@ pub struct Enough {
     pub movements: Vec<Movement>,
     /// Slides to learn from, of each texture at each movement.
     pub slides: usize,
-    /// What was left out or lowered, in sentences.
+    /// Omissions and lowered numbers, in sentences.
     pub notes: Vec<String>,
 }
 

@@ -298,8 +298,8 @@ impl<'t, W: Write> Show<'t, W> {
             }
             VerdictKind::MostLike => writeln!(
                 self.out,
-                "\nIt is most like {name}: {p:.1} % among those I know, after {slides}. I am not sure of names, as too many \
-                 new textures would get one; if nothing new can come, say so with --closed."
+                "\nIt is most like {name}: {p:.1} % among those I know, after {slides}. I am not sure of names, as too \
+                 many new textures would get one; if nothing new can come, say so with --closed."
             ),
             VerdictKind::Undecided => writeln!(
                 self.out,

@@ -20,7 +20,7 @@ pub struct Transcript {
 }
 
 /// A slide: the reason for it, its measurements, and the posterior after it.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Default)]
 struct SlideRecord {
     force_n: Option<f32>,
     speed_mm_s: Option<f32>,
@@ -173,13 +173,7 @@ impl SlideRecord {
             speed_mm_s: movement.and_then(|movement| movement.known().1),
             property: action.property.map(Property::name),
             expected_uncertainty: chosen.map(|chosen| chosen.uncertainty),
-            traction_n: None,
-            roughness_ln: None,
-            roughness_is_bound: false,
-            fineness_ln: None,
-            ended_after_s: None,
-            rejected: None,
-            posterior: Vec::new(),
+            ..Self::default()
         }
     }
 }

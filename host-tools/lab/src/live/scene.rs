@@ -15,6 +15,7 @@ use tactus_world::world::Truth;
 
 const PDC_MS: u64 = 10;
 
+#[derive(Default)]
 pub(super) struct Scene {
     /// The time at which it stands still; `None`: it does not.
     pub(super) until: Option<Duration>,
@@ -31,22 +32,6 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    pub(super) fn new() -> Self {
-        Self {
-            until: None,
-            waits: Cell::new(false),
-            texture: None,
-            wear: None,
-            stop: false,
-            monitor: ProbeMonitor::default(),
-            now: Duration::ZERO,
-            phase: Phase::Parked,
-            truth: Truth::default(),
-            pdc: Vec::new(),
-            busy: false,
-        }
-    }
-
     pub(super) fn now(&self) -> Duration {
         self.now
     }

@@ -202,7 +202,7 @@ impl Session {
         let mut rig = SimRig::new(shimmed(collection.setup(1, 1 + trial)));
         rig.control().calibrate(calibration)?;
         rig.home()?;
-        let (scene, desk) = (Rc::new(RefCell::new(Scene::new())), Desk::default());
+        let (scene, desk) = (Rc::new(RefCell::new(Scene::default())), Desk::default());
         let life = live(rig, factory, Rc::clone(&scene), Rc::clone(&desk));
         let mut running = Running {
             paper,

@@ -27,7 +27,7 @@ pub struct Collection {
     pub textures: Vec<u8>,
     /// Trials of each texture and movement.
     pub trials: u32,
-    /// What touches them.
+    /// The finger that touches them.
     pub finger: FingerName,
 }
 

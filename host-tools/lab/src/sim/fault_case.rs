@@ -33,19 +33,19 @@ use tactus_world::mount::Mount;
 use tactus_world::world::Truth;
 
 /// Number of tries to home for a rig that is repaired.
-pub const HOMINGS: usize = 3;
+const HOMINGS: usize = 3;
 /// The share of false alarms that the probe is set to.
-pub const SHARE: f32 = 0.03;
+const SHARE: f32 = 0.03;
 /// Largest force on a lifted finger, N.
-pub const LIFTED_N: f64 = 0.02;
+const LIFTED_N: f64 = 0.02;
 /// Largest speed of a stage that stands, mm/s.
 const STANDS_MM_S: f64 = 0.5;
 /// Largest way of a lever that stands, mm, in [`STILL_MS`].
-pub const STILL_MM: f64 = 0.01;
+const STILL_MM: f64 = 0.01;
 /// See [`STILL_MM`].
-pub const STILL_MS: u32 = 500;
+const STILL_MS: u32 = 500;
 /// Time until a rig is at rest at the latest, s.
-pub const REST_S: u64 = 120;
+const REST_S: u64 = 120;
 
 /// The world that the table of the firmware is learned from.
 pub fn world() -> Collection {
@@ -109,7 +109,7 @@ pub struct Case {
 
 /// Returns true if the user's remedy for the fault frees a finger that still presses: where the rig cannot lift it, by
 /// the lever's knob or because the stop has taken the supply.
-pub fn frees_the_finger(named: Named) -> bool {
+fn frees_the_finger(named: Named) -> bool {
     named == Named::EStop || named.recovery().contains("knob")
 }
 
@@ -190,7 +190,7 @@ impl fmt::Display for Outcome {
 impl Outcome {
     /// Notes the faults of a rig that has come to rest, by the world: its finger is lifted, unless a fault was named
     /// that says how it is freed.
-    pub fn judge_rest(truth: &Truth, named: &[Named], wrong: &mut Vec<String>) {
+    fn judge_rest(truth: &Truth, named: &[Named], wrong: &mut Vec<String>) {
         if truth.speed_mm_s.abs() > STANDS_MM_S {
             wrong.push(format!("the stage moves, {:.1} mm/s", truth.speed_mm_s));
         }
@@ -203,14 +203,14 @@ impl Outcome {
     }
 
     /// What the store has lost: with each thing, whether it is as it was, or may be another one.
-    pub fn judge_kept(kept: [bool; 3], wrong: &mut Vec<String>) {
+    fn judge_kept(kept: [bool; 3], wrong: &mut Vec<String>) {
         let what = ["table", "calibration", "share of false alarms"];
         let lost = kept.into_iter().zip(what).filter(|(is_kept, _)| !is_kept);
         wrong.extend(lost.map(|(_, what)| format!("the {what} has changed")));
     }
 
     /// The store after the power was off: another one than before only with a word, and only if its bits changed.
-    pub fn judge_store(case: &Case, same: bool, troubles: &[String], wrong: &mut Vec<String>) {
+    fn judge_store(case: &Case, same: bool, troubles: &[String], wrong: &mut Vec<String>) {
         if !same && troubles.is_empty() {
             wrong.push("another store after the power was off, without a word".into());
         }

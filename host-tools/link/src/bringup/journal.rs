@@ -19,9 +19,9 @@ pub struct Entry {
     pub at: String,
     /// True if nothing is wrong.
     pub passed: bool,
-    /// What was seen.
+    /// The observation.
     pub saw: String,
-    /// What is wrong.
+    /// The mistakes.
     pub mistakes: Vec<EntryMistake>,
     /// Counts of P_DC and weights, mN, of the force scale.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -33,14 +33,14 @@ pub struct Entry {
 pub struct EntryMistake {
     /// Its key.
     pub key: String,
-    /// What it is, and where.
+    /// The mistake, and its place.
     pub what: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 
 impl Entry {
-    /// What a step found at a time.
+    /// The finding of a step at a time.
     pub fn new(step: &Step, at: String, found: &Finding) -> Self {
         let mistakes = found.named.iter().map(|named| {
             let place = match named.place {

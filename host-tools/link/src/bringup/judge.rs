@@ -37,12 +37,12 @@ pub const GAIN: (f64, f64) = (0.9, 1.1);
 /// Most damaged words in a second, of 4400.
 const WORDS: u32 = 0;
 
-/// What a step found.
+/// The finding of a step.
 #[derive(Clone, Debug, Default)]
 pub struct Finding {
     /// In a sentence.
     pub saw: String,
-    /// What is wrong; nothing where the step has passed.
+    /// The mistakes; none where the step has passed.
     pub named: Vec<Named>,
     /// Counts of P_DC and weights, mN, of the force scale.
     pub points: Vec<[f64; 2]>,
@@ -112,7 +112,7 @@ pub fn chip(seen: &ChipSeen, reset: Reset, last_words: Option<&str>) -> Finding 
         .wrong(brown_out != 0, &m::BROWN_OUT, "")
 }
 
-/// What hangs on the pins, the sensor selected and the stage anywhere.
+/// Judges the parts on the pins, the sensor selected and the stage anywhere.
 pub fn pins(seen: &PinsSeen) -> Finding {
     let tied = |pin| seen.tied(pin);
     let words = Pin::ALL.map(|pin| format!("{}: {}", place(pin), word(tied(pin))));
@@ -191,7 +191,7 @@ pub fn sensor(seen: &SensorSeen) -> Finding {
         )
 }
 
-/// What the sensor measures without finger on anything.
+/// Judges the sensor's readings without finger on anything.
 pub fn noise(seen: &SensorSeen) -> Finding {
     let ([_, pac], [pdc, pdc_rms]) = (seen.pac, seen.pdc);
     Finding::new(format!(
@@ -382,7 +382,7 @@ pub(crate) fn lever_switch(up: &LeverSeen, down: &LeverSeen, back: &LeverSeen) -
         )
 }
 
-/// How far the lever went down by a caliper, mm, where it was asked for [`LEVER_MM`].
+/// Judges the lever's way down by a caliper, mm, where it was asked for [`LEVER_MM`].
 pub(crate) fn lever_scale(moved_mm: f64) -> Finding {
     let (asked, off) = LEVER_MM;
     let scale = moved_mm / asked;
@@ -524,7 +524,7 @@ pub fn store(done: &Result<[u32; 2], String>) -> Finding {
     }
 }
 
-/// What started the board after the firmware hung.
+/// Judges the reset that started the board after the firmware hung.
 pub fn watchdog(reset: Option<Reset>) -> Finding {
     let saw = match reset {
         Some(reset) => format!("started again by {reset:?}"),

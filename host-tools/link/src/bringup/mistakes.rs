@@ -5,9 +5,9 @@
 pub struct Mistake {
     /// Its name for programs.
     pub key: &'static str,
-    /// What is wrong.
+    /// The mistake.
     pub what: &'static str,
-    /// What to do.
+    /// The remedy.
     pub remedy: &'static str,
 }
 

@@ -10,7 +10,7 @@ use super::journal::{Entry, Journal};
 use super::steps::STEPS;
 use crate::whole::write_whole;
 
-/// What is known of a rig.
+/// The knowledge of a rig.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Version of this program.

@@ -7,7 +7,7 @@ use tactus_core::wire::{Command, Report, Reset};
 
 use crate::LinkError;
 
-/// Why a step came to no end.
+/// The reason why a step came to no end.
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
     /// The person ends it.

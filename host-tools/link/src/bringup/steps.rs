@@ -17,16 +17,16 @@ use super::seams::{Board, Person, Trouble};
 pub struct Step {
     /// Its name for programs and for `--from`.
     pub key: &'static str,
-    /// What it checks.
+    /// The subject of the check.
     pub checks: &'static str,
-    /// How: what the person does, what the board does.
+    /// The work of the person and of the board.
     pub how: &'static str,
-    /// What is right, with the limits that it is judged by.
+    /// The limits of a right result.
     pub limit: fn() -> String,
     pub(super) run: Run,
 }
 
-/// What is done, and the image that it takes.
+/// The work of a step, and the image that it takes.
 pub(super) enum Run {
     SelfTest(fn(&mut Bench<'_>) -> Result<Finding, Trouble>),
     Rig(fn(&mut Mounted<'_>) -> Result<Finding, Trouble>),
@@ -69,7 +69,7 @@ macro_rules! ask {
 /// Weights that somebody has, and what one g is, mN.
 const WEIGHTS_G: [u8; 3] = [50, 100, 150];
 const MN_PER_G: f64 = 9.806_65;
-/// How long the last one stands, s.
+/// Time for which the last one stands, s.
 const HELD_S: u32 = 4;
 
 fn range((from, to): (f64, f64), unit: &str) -> String {

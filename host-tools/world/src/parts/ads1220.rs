@@ -20,15 +20,22 @@ const SUPPLY_V: f64 = 3.3;
 const INTERNAL_V: f64 = 2.048;
 const FULL: f64 = 8_388_607.0;
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum Says {
+    #[default]
     Command,
     Data(u8),
-    Read { register: u8, left: u8 },
-    Write { register: u8, left: u8 },
+    Read {
+        register: u8,
+        left: u8,
+    },
+    Write {
+        register: u8,
+        left: u8,
+    },
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Ads1220 {
     registers: [u8; 4],
     noise: Noise,
@@ -58,21 +65,10 @@ impl Ads1220 {
         let mut noise = Noise::new(seed, 611);
         let clock = noise.between(-CLOCK_SHARE, CLOCK_SHARE);
         Self {
-            registers: [0; 4],
             noise,
             clock,
             ready_ns: POWER_UP_NS,
-            wire_cut: false,
-            converts: None,
-            sum: (0.0, 0.0),
-            tick_ns: 0,
-            code: 0,
-            ratio: 0.0,
-            heard: false,
-            wrong_phase: None,
-            says: Says::Command,
-            shown: [0; 3],
-            complaints: 0,
+            ..Self::default()
         }
     }
 

@@ -1,5 +1,7 @@
 //! The 117 textures by name and group (PAPER Table 1).
 
+use std::sync::LazyLock;
+
 /// Kinds of texture: the groups under the paper's Table 1.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Group {
@@ -30,135 +32,47 @@ pub struct Named {
     pub(crate) group: Group,
 }
 
-const fn named(number: u8, name: &'static str, group: Group) -> Named {
-    Named {
-        number,
-        name,
-        group,
-    }
-}
+/// The names of Table 1 in its order, group by group.
+#[rustfmt::skip]
+const GROUPS: [(Group, &str); 14] = [
+    (Group::Paper, "Computer paper; Linen paper; Smooth cardstock; Marble cardstock; Canvas cardstock; \
+        Double mulberry paper; Vellum; Cardboard; Foam board"),
+    (Group::Art, "Velcro hooks; Velcro eyes; Acrylic felt; Polyester felt; Stiffened felt; Velvet paper; Canvas; \
+        Foam sheet; Plastic paper; Template plastic; Plastic mesh (5 mm); Tarp; Corkboard; Carpet"),
+    (Group::Glass, "Frosted glass; Flemish glass; Satin glass; Frosty vue glass; Textured glass"),
+    (Group::Foam, "Styrofoam; Soft foam; Very soft foam"),
+    (Group::Tile, "Marble; Smooth tile; Rough tile; Natural stone laminate"),
+    (Group::Wood, "Oak wood; Polished hickory; Balsa wood"),
+    (Group::Engineering, "Nylon plastic; PVC plastic; Acrylic; Graphite; Alumina graphite; Milled aluminum; \
+        Ground aluminum; Polished aluminum"),
+    (Group::Rubber, "Polyurethane rubber; Neoprene rubber; Nitrile rubber; Buna-N rubber; Santoprene rubber; \
+        Viton rubber; Haplon rubber; Silicone rubber"),
+    (Group::Vinyl, "Plastic sheet; Car vinyl; Textured vinyl #1; Textured vinyl #2; PVC vinyl; Snakeskin vinyl; \
+        Lacquered vinyl; Smooth vinyl; Canvas vinyl; Madrid vinyl; Corinthian vinyl; PVC snakeskin"),
+    (Group::Leather, "Coarse leather; Medium-coarse leather; Smooth leather; Coarse suede; Smooth suede; \
+        Very soft suede"),
+    (Group::Cotton, "Crepe de chine; Silk satin; Pimatex cotton; Cotton jersey; Cotton crush; Cotton interlock; \
+        Cotton lycra; Cotton velveteen; Coarse cotton; Soft cotton; Upholstery vinyl"),
+    (Group::Fabric, "Charmeuse satin; Cotton/silk blend; Lens-cleaning fabric; Rayon; Crushed satin; Raw silk; \
+        Crushed velvet; Corduroy; Silk velvet; Short-hair fur; Velboa; Terry cloth; Velour; Velvet; Viscose challis; \
+        Cotton sateen"),
+    (Group::Weave, "Burlap; Hand-woven cotton; Cotton duck; Bull denim; Jean denim; Denim twill; Flannel; \
+        Pineapple fiber weave; Scenery canvas; Silk noil; Scenery muslin; Linen cloth; Cotton gauze; Bamboo rayon; \
+        Nylon fabric; Hemp silk"),
+    (Group::Fur, "Rabbit fur; Leopard shag"),
+];
 
 /// All textures of Table 1, in its order and with its names.
-#[rustfmt::skip]
-pub const TEXTURES: [Named; 117] = {
-    use Group::*;
-    [
-        named(1, "Computer paper", Paper),
-        named(2, "Linen paper", Paper),
-        named(3, "Smooth cardstock", Paper),
-        named(4, "Marble cardstock", Paper),
-        named(5, "Canvas cardstock", Paper),
-        named(6, "Double mulberry paper", Paper),
-        named(7, "Vellum", Paper),
-        named(8, "Cardboard", Paper),
-        named(9, "Foam board", Paper),
-        named(10, "Velcro hooks", Art),
-        named(11, "Velcro eyes", Art),
-        named(12, "Acrylic felt", Art),
-        named(13, "Polyester felt", Art),
-        named(14, "Stiffened felt", Art),
-        named(15, "Velvet paper", Art),
-        named(16, "Canvas", Art),
-        named(17, "Foam sheet", Art),
-        named(18, "Plastic paper", Art),
-        named(19, "Template plastic", Art),
-        named(20, "Plastic mesh (5 mm)", Art),
-        named(21, "Tarp", Art),
-        named(22, "Corkboard", Art),
-        named(23, "Carpet", Art),
-        named(24, "Frosted glass", Glass),
-        named(25, "Flemish glass", Glass),
-        named(26, "Satin glass", Glass),
-        named(27, "Frosty vue glass", Glass),
-        named(28, "Textured glass", Glass),
-        named(29, "Styrofoam", Foam),
-        named(30, "Soft foam", Foam),
-        named(31, "Very soft foam", Foam),
-        named(32, "Marble", Tile),
-        named(33, "Smooth tile", Tile),
-        named(34, "Rough tile", Tile),
-        named(35, "Natural stone laminate", Tile),
-        named(36, "Oak wood", Wood),
-        named(37, "Polished hickory", Wood),
-        named(38, "Balsa wood", Wood),
-        named(39, "Nylon plastic", Engineering),
-        named(40, "PVC plastic", Engineering),
-        named(41, "Acrylic", Engineering),
-        named(42, "Graphite", Engineering),
-        named(43, "Alumina graphite", Engineering),
-        named(44, "Milled aluminum", Engineering),
-        named(45, "Ground aluminum", Engineering),
-        named(46, "Polished aluminum", Engineering),
-        named(47, "Polyurethane rubber", Rubber),
-        named(48, "Neoprene rubber", Rubber),
-        named(49, "Nitrile rubber", Rubber),
-        named(50, "Buna-N rubber", Rubber),
-        named(51, "Santoprene rubber", Rubber),
-        named(52, "Viton rubber", Rubber),
-        named(53, "Haplon rubber", Rubber),
-        named(54, "Silicone rubber", Rubber),
-        named(55, "Plastic sheet", Vinyl),
-        named(56, "Car vinyl", Vinyl),
-        named(57, "Textured vinyl #1", Vinyl),
-        named(58, "Textured vinyl #2", Vinyl),
-        named(59, "PVC vinyl", Vinyl),
-        named(60, "Snakeskin vinyl", Vinyl),
-        named(61, "Lacquered vinyl", Vinyl),
-        named(62, "Smooth vinyl", Vinyl),
-        named(63, "Canvas vinyl", Vinyl),
-        named(64, "Madrid vinyl", Vinyl),
-        named(65, "Corinthian vinyl", Vinyl),
-        named(66, "PVC snakeskin", Vinyl),
-        named(67, "Coarse leather", Leather),
-        named(68, "Medium-coarse leather", Leather),
-        named(69, "Smooth leather", Leather),
-        named(70, "Coarse suede", Leather),
-        named(71, "Smooth suede", Leather),
-        named(72, "Very soft suede", Leather),
-        named(73, "Crepe de chine", Cotton),
-        named(74, "Silk satin", Cotton),
-        named(75, "Pimatex cotton", Cotton),
-        named(76, "Cotton jersey", Cotton),
-        named(77, "Cotton crush", Cotton),
-        named(78, "Cotton interlock", Cotton),
-        named(79, "Cotton lycra", Cotton),
-        named(80, "Cotton velveteen", Cotton),
-        named(81, "Coarse cotton", Cotton),
-        named(82, "Soft cotton", Cotton),
-        named(83, "Upholstery vinyl", Cotton),
-        named(84, "Charmeuse satin", Fabric),
-        named(85, "Cotton/silk blend", Fabric),
-        named(86, "Lens-cleaning fabric", Fabric),
-        named(87, "Rayon", Fabric),
-        named(88, "Crushed satin", Fabric),
-        named(89, "Raw silk", Fabric),
-        named(90, "Crushed velvet", Fabric),
-        named(91, "Corduroy", Fabric),
-        named(92, "Silk velvet", Fabric),
-        named(93, "Short-hair fur", Fabric),
-        named(94, "Velboa", Fabric),
-        named(95, "Terry cloth", Fabric),
-        named(96, "Velour", Fabric),
-        named(97, "Velvet", Fabric),
-        named(98, "Viscose challis", Fabric),
-        named(99, "Cotton sateen", Fabric),
-        named(100, "Burlap", Weave),
-        named(101, "Hand-woven cotton", Weave),
-        named(102, "Cotton duck", Weave),
-        named(103, "Bull denim", Weave),
-        named(104, "Jean denim", Weave),
-        named(105, "Denim twill", Weave),
-        named(106, "Flannel", Weave),
-        named(107, "Pineapple fiber weave", Weave),
-        named(108, "Scenery canvas", Weave),
-        named(109, "Silk noil", Weave),
-        named(110, "Scenery muslin", Weave),
-        named(111, "Linen cloth", Weave),
-        named(112, "Cotton gauze", Weave),
-        named(113, "Bamboo rayon", Weave),
-        named(114, "Nylon fabric", Weave),
-        named(115, "Hemp silk", Weave),
-        named(116, "Rabbit fur", Fur),
-        named(117, "Leopard shag", Fur),
-    ]
-};
+pub static TEXTURES: LazyLock<Vec<Named>> = LazyLock::new(|| {
+    let names = GROUPS
+        .iter()
+        .flat_map(|&(group, names)| names.split("; ").map(move |name| (group, name)));
+    let numbered = (1..).zip(names);
+    numbered
+        .map(|(number, (group, name))| Named {
+            number,
+            name,
+            group,
+        })
+        .collect()
+});

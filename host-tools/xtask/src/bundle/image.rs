@@ -12,7 +12,7 @@ pub(super) fn flat(elf: &[u8]) -> Result<Vec<u8>> {
     joined(&loads(elf)?)
 }
 
-/// What an ELF puts into the chip: addresses and bytes.
+/// The addresses and bytes that an ELF puts into the chip.
 fn loads(elf: &[u8]) -> Result<Vec<(u32, &[u8])>> {
     let file =
         ElfFile::<FileHeader32<Endianness>>::parse(elf).context("not an ELF for the chip")?;

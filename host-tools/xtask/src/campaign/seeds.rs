@@ -117,7 +117,7 @@ pub(super) fn run(by_hand: bool, seeds: &RangeInclusive<u64>, options: &Options)
     shell::run(&mut emulate::build())?;
     let elf = firmware::compile(&[image])?.remove(0);
     let all: Vec<u64> = seeds.clone().collect();
-    let ended = shell::each_of(&all, options.jobs.unwrap_or_else(shell::cores), |seed| {
+    let ended = shell::each_of(&all, shell::cores(), |seed| {
         let mut command = command(run, *seed, &elf, options);
         let explored = Explored::by(&mut command);
         if explored.ending > Ending::Right {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use anyhow::Result;
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 
-/// What a call of a function that panics comes from.
+/// The origin of a call of a function that panics.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Kind {
     Dependency,

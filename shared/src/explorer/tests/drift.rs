@@ -26,7 +26,7 @@ pub(super) struct Recipe {
     pub(super) slopes: Vec<Slope>,
 }
 
-/// How often the recipe tells the same, and what.
+/// Agreement of the recipe and the explorer, kind by kind.
 #[derive(Default, Debug)]
 pub(super) struct Agreement {
     pub(super) all: i32,

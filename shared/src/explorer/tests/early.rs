@@ -9,7 +9,7 @@ use crate::table::{
 
 type Fused<'t> = Explorer<'t, 8>;
 
-/// What is known of five textures at two movements, `by` apart from others.
+/// Statistics of five textures at two movements, `by` apart from others.
 fn textures(by: f64) -> Vec<Vec<Whitened>> {
     let row = |t: f64| {
         let first = known(5, &[7.0 * t + by, 5.0 * (t % 2.0) - by]);

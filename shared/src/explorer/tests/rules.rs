@@ -321,7 +321,7 @@ fn a_slide_without_the_property_is_not_used() {
     assert_eq!(state(&mut explorer), before);
 }
 
-/// What the explorer leaves out changes the uncertainty by no more than twice its probability.
+/// Checks that left-out textures change the uncertainty by no more than twice their probability.
 #[test]
 fn negligible_textures_change_little() {
     let means: Vec<f32> = (0..8).map(|n| 0.06 * n as f32).collect();

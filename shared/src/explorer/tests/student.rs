@@ -118,7 +118,7 @@ fn begin(table: Table<'_>, measured: PropertySet, method: Method) -> Eight<'_> {
     Eight::new(table, measured, config).unwrap()
 }
 
-/// What eq. 11 makes of these Gaussians per property, for the probabilities `p`.
+/// Equation 11 of these Gaussians per property, for the probabilities `p`.
 fn uncertainty(known: &[Vec<(f64, f64)>], p: &[f64]) -> f64 {
     let confusion = |i: usize, j: usize| -> f64 {
         let pairs = known.iter().map(|of| eq7(of[i], of[j]));

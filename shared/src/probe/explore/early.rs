@@ -45,7 +45,7 @@ pub(super) async fn perform<R: Rig, const N: usize>(
     rig.perform_until(slide, enough).await.map(|()| ended)
 }
 
-/// What a slide says that ended at this length, or at its end.
+/// Measures a slide that ended at this length, or at its end.
 pub(super) fn measure(
     slide: &mut Slide<'_>,
     length: Option<Length>,

@@ -12,7 +12,7 @@ use std::string::String;
 use std::vec;
 use std::vec::Vec;
 
-/// What the finger feels next.
+/// The next stimulus of the finger.
 #[derive(Clone, Copy)]
 enum Stimulus {
     /// A slide with this tangential force in mN.

@@ -3,7 +3,7 @@ use std::vec::Vec;
 use super::*;
 use crate::sensor::{AnyFinger, BadWord};
 
-/// What a finger's parts say to those who look for one, by the first byte that is sent.
+/// The answers of a finger's parts to those who look for one, by the first byte that is sent.
 fn found(says: impl Fn(FingerName, &Transaction) -> Vec<u8>) -> Option<FingerName> {
     find(|finger, transaction, _| {
         let answer = says(finger, transaction);

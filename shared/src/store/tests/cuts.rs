@@ -7,7 +7,7 @@ use crate::table::Whitened;
 use crate::table::tests::fixed;
 use proptest::prelude::*;
 
-/// What can be stored, small enough for a page of the tests.
+/// An operation of the store, small enough for a page of the tests.
 #[derive(Clone, Debug)]
 enum Operation {
     Push(u8, usize),
@@ -20,12 +20,12 @@ enum Operation {
     Forget(u8),
     /// By itself.
     Learn(u8, u8),
-    /// What was learned by itself: of this texture, or all.
+    /// Forgets what was learned by itself: of this texture, or all.
     Unlearn(Option<u8>),
     EraseSettings,
 }
 
-/// What the store is to hold.
+/// The expected contents of the store.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(super) struct Model {
     pub(super) table: Option<Vec<u8>>,
@@ -92,7 +92,7 @@ impl Model {
         Self::damaged(store)
     }
 
-    /// How many of the settings are not as in `other`.
+    /// Number of the settings that are not as in `other`.
     pub(super) fn differences(&self, other: &Self) -> usize {
         let records = self.training_record.iter().flatten();
         let theirs = other.training_record.iter().flatten();

@@ -11,7 +11,7 @@ use crate::store::SECTORS;
 /// Sectors of a sixteenth of the chip's, unless others are wanted, so that every word of every operation can be cut.
 pub(crate) const SECTOR: usize = 1024;
 
-/// What is left of the operation that the power was cut in.
+/// The state of the operation that the power was cut in.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Torn {
     /// Nothing of the word; the erase had not begun.

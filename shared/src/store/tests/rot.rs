@@ -107,7 +107,7 @@ fn bit(ram: &Ram, region: usize, any: u32) -> usize {
     8 * from + (any >> 8) % (8 * length)
 }
 
-/// What the store says of itself.
+/// The store's account of itself.
 fn said(store: &Store<Ram>) -> (bool, Option<SettingsError>, Result<(), SettingsError>) {
     let table = store.damaged_table().is_some();
     (table, store.damaged_record(), store.settings())

@@ -255,7 +255,7 @@ impl Bench {
     }
 }
 
-/// Why a log did not get its name when its bench was left.
+/// The reason why a log did not get its name when its bench was left.
 static UNKEPT: OnceLock<io::Error> = OnceLock::new();
 
 impl Drop for Bench {

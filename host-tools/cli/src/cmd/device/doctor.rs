@@ -60,7 +60,7 @@ struct Check {
     remedy: Option<String>,
 }
 
-/// What `device doctor --format json` prints.
+/// The output of `device doctor --format json`.
 #[derive(Default, Serialize)]
 struct Checks {
     checks: Vec<Check>,
@@ -128,7 +128,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Why the probe is not reached; the sentence says what to do.
+/// Says why the probe is not reached, and what to do.
 fn unreached(why: &BenchError, checks: &mut Checks) {
     match why {
         BenchError::Open(why) => {
@@ -186,7 +186,7 @@ fn remedy(fault: Fault) -> String {
     format!("{} (`tactus device home`)", fault.recovery())
 }
 
-/// How long an answer takes, and what was lost.
+/// Checks the time of an answer, and what was lost.
 fn line(bench: &mut Bench, checks: &mut Checks) -> Result<(), BenchError> {
     let mut taken = Vec::new();
     for _ in 0..LOOKS {
@@ -341,17 +341,8 @@ mod tests {
             };
             let status = Status {
                 phase: tactus_core::wire::Phase::Ready,
-                fault: None,
-                textures: 0,
-                table_bytes: 0,
-                table_crc: 0,
-                factory: false,
-                calibrated: 0,
                 counts,
-                skin_mj: (0, 0),
-                false_alarm: None,
-                high_force: false,
-                finger: Default::default(),
+                ..Status::default()
             };
             let mut checks = Checks::default();
             acquisition(&status, &mut checks);

@@ -25,7 +25,7 @@ use super::identify::Args;
 use crate::cmd::output::Format;
 use crate::cmd::say;
 
-/// How often the screen is drawn, and the probe asked how it is.
+/// Interval of the screen's drawings and of the status requests.
 const DRAWN: Duration = Duration::from_millis(100);
 const ASKED: Duration = Duration::from_secs(1);
 /// The monitor asks for the status every second, and shows a probe as silent that says nothing for so long.
@@ -220,7 +220,7 @@ fn keys() -> Receiver<io::Result<KeyEvent>> {
     keys
 }
 
-/// Whether the terminal has been closed.
+/// Returns true if the terminal has been closed.
 #[cfg(unix)]
 fn is_gone(terminal: &impl std::os::fd::AsFd) -> bool {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};

@@ -34,7 +34,7 @@ struct Summary<'a> {
     status: &'a Status,
     /// CRC-32, in hexadecimal digits.
     table_checksum: String,
-    /// What to do about the fault.
+    /// The remedy of the fault.
     recovery: Option<&'static str>,
     /// Work of sliding, and that part of it that wears the skin.
     skin_j: f64,
@@ -51,7 +51,7 @@ struct CalibrationSummary {
     force_scale_date: Option<String>,
     sensor: Option<String>,
     pdc_in_the_air_counts: f32,
-    /// Whether that was measured.
+    /// True if that was measured.
     air_known: bool,
     force_mn_per_count: f32,
     /// Motor current without load at standstill, and more of it for each mm/s.

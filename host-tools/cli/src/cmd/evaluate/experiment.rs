@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
+use serde::Serialize;
 use tactus_lab::data::import::settings::Settings;
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::eval::evaluate::Method;
@@ -122,6 +123,38 @@ impl Args {
 pub(crate) enum Novelty {
     /// One texture after the other is left out of the table, or one group after the other with --left-out
     LeaveOneOut,
+}
+
+/// Figures of a kind, with the conditions that they were measured under.
+#[derive(Serialize)]
+pub(crate) struct Figures<'n, T> {
+    method: Method,
+    pub(crate) protocol: &'static str,
+    pub(crate) train_slides: usize,
+    pub(crate) notes: &'n [String],
+    pub(crate) runs: u64,
+    pub(crate) seed: u64,
+    #[serde(flatten)]
+    pub(crate) of: &'n T,
+}
+
+impl<'n, T> Figures<'n, T> {
+    pub(crate) fn new(
+        args: &Args,
+        from: &'n Experiment,
+        protocol: &'static str,
+        of: &'n T,
+    ) -> Self {
+        Self {
+            method: args.method,
+            protocol,
+            train_slides: from.train_slides,
+            notes: &from.notes,
+            runs: args.runs(),
+            seed: args.seed,
+            of,
+        }
+    }
 }
 
 pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {

@@ -3,30 +3,16 @@
 use std::io::Write;
 
 use anyhow::ensure;
-use serde::Serialize;
 use tactus_core::explorer::Config;
-use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::Experiment;
-use tactus_lab::eval::novelty::{self, Novelty};
+use tactus_lab::eval::novelty;
 use tactus_lab::eval::open_set;
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verdicts::Verdicts;
 
-use super::experiment::Args;
+use super::experiment::{Args, Figures};
 use crate::cmd::output::{Format, print_json, verdict_rows};
 use crate::cmd::progress::with_progress;
-
-#[derive(Serialize)]
-struct NoveltyFigures<'n> {
-    method: Method,
-    protocol: &'static str,
-    train_slides: usize,
-    notes: &'n [String],
-    runs: u64,
-    seed: u64,
-    #[serde(flatten)]
-    novelty: Novelty,
-}
 
 /// Leaves every texture out of the table in turn.
 pub(crate) fn leave_one_out(
@@ -46,16 +32,7 @@ pub(crate) fn leave_one_out(
     })?;
     let (train_slides, runs, seed) = (experiment.train_slides, args.runs(), args.seed);
     if args.format == Format::Json {
-        let figures = NoveltyFigures {
-            method: args.method,
-            protocol,
-            train_slides,
-            notes: &experiment.notes,
-            runs,
-            seed,
-            novelty,
-        };
-        return print_json(&figures, out);
+        return print_json(&Figures::new(args, experiment, protocol, &novelty), out);
     }
     writeln!(
         out,

@@ -3,30 +3,16 @@
 use std::io::Write;
 
 use anyhow::ensure;
-use serde::Serialize;
 use tactus_core::explorer::Config;
-use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::Experiment;
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verify::{AnswerShares, Verified, verify};
 use tactus_study::pictures::trade_off;
 
-use super::experiment::Args;
+use super::experiment::{Args, Figures};
 use crate::cmd::output::{Format, print_json};
 use crate::cmd::plot::Canvas;
 use crate::cmd::progress::with_progress;
-
-#[derive(Serialize)]
-struct Figures<'n> {
-    method: Method,
-    protocol: &'static str,
-    train_slides: usize,
-    notes: &'n [String],
-    runs: u64,
-    seed: u64,
-    #[serde(flatten)]
-    verified: Verified,
-}
 
 pub(super) fn run(
     args: &Args,
@@ -43,27 +29,19 @@ pub(super) fn run(
     let verified = with_progress(args.runs(), "holding slides against references", |done| {
         verify(experiment, config, args.runs(), done)
     })?;
-    let figures = Figures {
-        method: args.method,
-        protocol,
-        train_slides: experiment.train_slides,
-        notes: &experiment.notes,
-        runs: args.runs(),
-        seed: args.seed,
-        verified,
-    };
+    let figures = Figures::new(args, experiment, protocol, &verified);
     match args.format {
         Format::Json => print_json(&figures, out)?,
         Format::Text => print(&figures, out)?,
     }
     if let Some(canvas) = canvas {
-        let figure = trade_off::figure(&figures.verified.verify)?;
+        let figure = trade_off::figure(&verified.verify)?;
         canvas.write(&[figure], out)?;
     }
     Ok(())
 }
 
-fn print(figures: &Figures<'_>, out: &mut impl Write) -> anyhow::Result<()> {
+fn print(figures: &Figures<'_, Verified>, out: &mut impl Write) -> anyhow::Result<()> {
     let runs = count(figures.runs, "run");
     let (protocol, slides, seed) = (figures.protocol, figures.train_slides, figures.seed);
     writeln!(
@@ -74,7 +52,7 @@ fn print(figures: &Figures<'_>, out: &mut impl Write) -> anyhow::Result<()> {
         writeln!(out, "{note}")?;
     }
     let percent = |share: f64| format!("{:5.2} %", 100.0 * share);
-    for after in &figures.verified.verify {
+    for after in &figures.of.verify {
         writeln!(
             out,
             "  after {:<9} equal error {}, at the limits its own rejected {}, others accepted {}",
@@ -85,8 +63,8 @@ fn print(figures: &Figures<'_>, out: &mut impl Write) -> anyhow::Result<()> {
         )?;
     }
     for (whose, told) in [
-        ("its own slides", figures.verified.same),
-        ("those of others", figures.verified.other),
+        ("its own slides", figures.of.same),
+        ("those of others", figures.of.other),
     ] {
         let AnswerShares {
             same,

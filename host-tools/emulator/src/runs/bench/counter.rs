@@ -22,7 +22,7 @@ pub(super) struct Bench {
     overhead: u64,
 }
 
-/// What has the silicon image serve the bench.
+/// The word that has the silicon image serve the bench.
 const WANTED: u32 = 0x7ac7_be7c;
 /// Offsets in the silicon image's `Desk`.
 const STATE: u64 = 0;

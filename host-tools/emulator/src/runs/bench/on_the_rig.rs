@@ -5,16 +5,15 @@ use std::path::Path;
 use anyhow::Context as _;
 use tactus_core::rig::lever::RETRACT_STEPS_S;
 use tactus_core::sensor::FingerName;
-use tactus_core::wire::{Command, Event, Phase};
+use tactus_core::wire::{Command, Event, Identify, Phase};
 use tactus_world::world::Setup;
 
 use super::gates::gate;
-use super::one_slide;
 use super::row::Row;
-use super::slowed::CORE_HZ;
 use crate::board::{Emulator, Options, Output};
 use crate::host::talk::Talk;
 
+const CORE_HZ: f64 = 168e6;
 /// Longest that the rig takes for anything, virtual seconds.
 const TIMEOUT_S: f64 = 120.0;
 
@@ -46,35 +45,38 @@ pub(super) fn on_the_rig(elf: &Path, finger: FingerName) -> anyhow::Result<Vec<R
     let handlers = handlers.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut talk = Talk::new(emulator);
     talk.ready(|_, _| ())?;
+    let one_slide = Identify {
+        threshold: 1.0,
+        max_slides: 1,
+        open: false,
+        seed: 1,
+        ..Identify::default()
+    };
     // times in ns and instructions so far
     let (mut begun, mut over, mut told) = (None, None, None);
     let (mut lifts_ns, mut commands) = (None, 0);
     let mut failed = None;
-    talk.send(
-        Command::Identify(one_slide()),
-        TIMEOUT_S,
-        |board, report| {
-            let mut now = |board: &mut Emulator| {
-                let instructions = board.instructions();
-                let instructions = instructions.map_err(|why| failed = Some(why)).unwrap_or(0);
-                Some((board.now_ns(), instructions))
-            };
-            match report.map(|report| &report.event) {
-                Some(Event::Phase(Phase::Sliding)) if begun.is_none() => {
-                    begun = now(board);
-                    let counted = board.count_handlers(handlers.clone());
-                    failed = counted.err();
-                    commands = board.rig().sensor_commands();
-                }
-                Some(Event::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
-                Some(Event::Verdict(_)) => {
-                    told = now(board);
-                    lifts_ns = begun.and_then(|(from_ns, _)| first_step_up(board, from_ns));
-                }
-                _ => {}
+    talk.send(Command::Identify(one_slide), TIMEOUT_S, |board, report| {
+        let mut now = |board: &mut Emulator| {
+            let instructions = board.instructions();
+            let instructions = instructions.map_err(|why| failed = Some(why)).unwrap_or(0);
+            Some((board.now_ns(), instructions))
+        };
+        match report.map(|report| &report.event) {
+            Some(Event::Phase(Phase::Sliding)) if begun.is_none() => {
+                begun = now(board);
+                let counted = board.count_handlers(handlers.clone());
+                failed = counted.err();
+                commands = board.rig().sensor_commands();
             }
-        },
-    )?;
+            Some(Event::Phase(Phase::Lifting)) if over.is_none() => over = now(board),
+            Some(Event::Verdict(_)) => {
+                told = now(board);
+                lifts_ns = begun.and_then(|(from_ns, _)| first_step_up(board, from_ns));
+            }
+            _ => {}
+        }
+    })?;
     if let Some(why) = failed {
         return Err(why.into());
     }

@@ -1,6 +1,4 @@
-//! What was counted, in a table and in JSON.
-
-use serde_json::{Value, json};
+//! The table of the counts.
 
 pub(super) struct Row {
     pub(super) kernel: String,
@@ -17,16 +15,6 @@ pub(super) struct Row {
 impl Row {
     pub(super) fn ok(&self) -> bool {
         self.equal && self.gate.is_none_or(|gate| self.instructions <= gate)
-    }
-
-    pub(super) fn json(&self) -> Value {
-        json!({
-            "kernel": self.kernel,
-            "unit": self.unit,
-            "instructions": self.instructions,
-            "gate": self.gate,
-            "ok": self.ok(),
-        })
     }
 }
 

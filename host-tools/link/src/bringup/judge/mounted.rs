@@ -11,13 +11,13 @@ use tactus_core::wire::{Counts, Live, SlideReport};
 use super::{Finding, m};
 use crate::bringup::weights;
 
-/// How far P_DC may be from where it was in the air, counts: 92 mN.
+/// Largest distance of P_DC from its value in the air, counts: 92 mN.
 pub(crate) const AIR_COUNTS: f32 = 8.0;
 /// Most that a weight may be off the line, as a share of it.
 pub(crate) const OFF_LINE: f32 = 0.1;
-/// How far a mean speed may be from the one that was asked for, as a share.
+/// Largest error of a mean speed, as a share.
 pub const SPEED_SHARE: f64 = 0.02;
-/// How far the stage may be from where its mean speed has it, mm: at the fastest a report may be 3 ms late.
+/// Largest distance of the stage from the place by its mean speed, mm: at the fastest a report may be 3 ms late.
 pub(crate) const UNEVEN_MM: f64 = 0.3;
 /// Reports of a run that are no steady speed, at each end: it takes 63 ms to its highest speed, and a report comes each
 /// 50 ms.
@@ -25,18 +25,18 @@ const RAMP: usize = 3;
 /// Slower than this it stands or turns round, um/s.
 const STANDS_UM_S: i32 = 2_000;
 
-/// What was told of a slide.
+/// The reports of a slide.
 #[derive(Clone, Debug, Default)]
 pub struct SlideSeen {
-    /// What was to be made.
+    /// The ordered movement.
     pub movement: Option<Movement>,
     /// Force by P_DC: ms since the first one, mN.
     pub force: Vec<[f64; 2]>,
-    /// What was measured.
+    /// The measured features.
     pub observed: Option<SlideReport>,
-    /// Why it failed, or was refused.
+    /// The reason why it failed, or was refused.
     pub failed: Option<String>,
-    /// What was counted since the firmware started.
+    /// Counts since the firmware started.
     pub counts: Counts,
 }
 

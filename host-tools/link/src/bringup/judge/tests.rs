@@ -22,7 +22,7 @@ pub(super) fn is_off(check: &Location<'_>) -> bool {
         .is_some_and(|(file, line)| check.file().ends_with(file) && check.line() == line)
 }
 
-/// What is measured, and the mistakes that are to be named, each with its place.
+/// Measurements, and the mistakes that are to be named, each with its place.
 type Case = (
     &'static str,
     fn() -> Finding,
@@ -250,11 +250,9 @@ fn runs(shares: [f64; 4], uneven_mm: f64) -> Finding {
                 places.push((
                     at_ms,
                     Live {
-                        force_mn: 0,
-                        steps: 0,
                         stage_um: (stage_um - way * late_um) as i32,
                         speed_um_s: (way * speed) as i32,
-                        current_ma: 0,
+                        ..Live::default()
                     },
                 ));
                 at_ms += 50;
@@ -270,11 +268,8 @@ fn slid(change: impl Fn(&mut SlideSeen)) -> Finding {
         force: vec![[0.0, 0.0], [1000.0, 1260.0]],
         observed: Some(SlideReport {
             properties: [Some(0.4), Some(3.0), Some(200.0)],
-            roughness_is_bound: false,
             background: 4.0,
-            bands: Default::default(),
-            pressure: None,
-            pace: None,
+            ..SlideReport::default()
         }),
         ..SlideSeen::default()
     };

@@ -25,6 +25,7 @@ pub(crate) struct Note {
     pub(crate) text: String,
 }
 
+#[derive(Default)]
 pub(crate) struct Monitor {
     pub(crate) place: String,
     pub(crate) names: Vec<String>,
@@ -56,20 +57,8 @@ impl Monitor {
         Self {
             place: place.to_owned(),
             names,
-            at_ms: 0,
-            live: None,
-            pac: VecDeque::new(),
-            movement: None,
-            posterior: Vec::new(),
-            answer: None,
-            notes: VecDeque::new(),
-            losses: (0, 0),
-            silent: None,
-            protocol: None,
-            rebooted: false,
-            stopped: false,
-            prompt: None,
             status,
+            ..Self::default()
         }
     }
 
@@ -110,7 +99,7 @@ impl Monitor {
         self.answer = None;
     }
 
-    /// Whether samples come now: only while the finger is at rest before a slide, and slides.
+    /// Returns true if samples come now: only while the finger is at rest before a slide, and slides.
     pub(crate) fn is_sampling(&self) -> bool {
         matches!(self.status.phase, Phase::Background | Phase::Sliding)
     }

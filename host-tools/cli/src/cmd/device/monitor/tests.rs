@@ -5,11 +5,10 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use tactus_core::features::{Block, Movement, Property};
 use tactus_core::rig::Fault;
-use tactus_core::sensor::FingerCode;
 use tactus_core::table::Action;
 use tactus_core::wire::{
-    Command, Counts, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status,
-    Text, Verdict,
+    Command, Event, ExpectedOutcome, Failure, Live, Phase, Report, SlideReport, Status, Text,
+    Verdict,
 };
 
 use super::state::{Monitor, NOTES, SHOWN};
@@ -18,17 +17,12 @@ use super::{End, KEYS, command_of, end_of, is_gone, view};
 fn status() -> Status {
     Status {
         phase: Phase::Ready,
-        fault: None,
         textures: 4,
         table_bytes: 900,
         table_crc: 7,
         factory: true,
-        calibrated: 0,
-        counts: Counts::default(),
         skin_mj: (1500, 250),
-        false_alarm: None,
-        high_force: false,
-        finger: FingerCode::BIOTAC,
+        ..Status::default()
     }
 }
 
@@ -86,11 +80,8 @@ fn exploration() -> Vec<Event> {
             action,
             observed: SlideReport {
                 properties: [Some(0.512), Some(5.25), None],
-                roughness_is_bound: false,
                 background: 1.0,
-                bands: Default::default(),
-                pressure: None,
-                pace: None,
+                ..SlideReport::default()
             },
             posterior: [0.05, 0.75, 0.15, 0.05].into_iter().collect(),
         },
@@ -108,19 +99,29 @@ fn exploration() -> Vec<Event> {
 fn a_slide_looks_like_this() {
     let screen = screen(&heard(exploration()), 80, 24);
     let golden = "\
-╭ Rig ─────────────────╮╭ What it may be ──────────────────────────────────────╮
-│phase   sliding       ││Oak wood                 ███████████████░░░░░  75.0 % │
-│force   1.050 N       ││Velcro                   ███░░░░░░░░░░░░░░░░░  15.0 % │
-│████████░░┃░░░░░ 2.1 N││Burlap                   █░░░░░░░░░░░░░░░░░░░   5.0 % │
-│speed    10.0 mm/s    ││Felt                     █░░░░░░░░░░░░░░░░░░░   5.0 % │
-│stage    31.3 mm      ││                                                      │
-│lever    1.00 mm      ││                                                      │
-│motor     132 mA      ││                                                      │
-╰──────────────────────╯╰──────────────────────────────────────────────────────╯
-╭ Messages ────────────────────────────────────────────────────────────────────╮
-│0:00:01 slide 1: 1.26 N, 10.0 mm/s                                            │
-│0:00:03 slide 1: most likely Oak wood, 75.0 %                                 │";
-    assert_eq!(screen[10..22].join("\n"), golden);
++ Rig -----------------++ What it may be --------------------------------------+
+|phase   sliding       ||Oak wood                 ###############.....  75.0 % |
+|force   1.050 N       ||Velcro                   ###.................  15.0 % |
+|########..!..... 2.1 N||Burlap                   #...................   5.0 % |
+|speed    10.0 mm/s    ||Felt                     #...................   5.0 % |
+|stage    31.3 mm      ||                                                      |
+|lever    1.00 mm      ||                                                      |
+|motor     132 mA      ||                                                      |
++----------------------++------------------------------------------------------+
++ Messages --------------------------------------------------------------------+
+|0:00:01 slide 1: 1.26 N, 10.0 mm/s                                            |
+|0:00:03 slide 1: most likely Oak wood, 75.0 %                                 |";
+    let plain = |letter: char| match letter {
+        '╭' | '╮' | '╰' | '╯' => '+',
+        '─' => '-',
+        '│' => '|',
+        '█' => '#',
+        '░' => '.',
+        '┃' => '!',
+        letter => letter,
+    };
+    let shown: String = screen[10..22].join("\n").chars().map(plain).collect();
+    assert_eq!(shown, golden);
     assert_eq!(
         screen[0],
         " Tactus  /dev/ttyACM0  4 textures (factory)            nothing lost, up 0:00:04"
@@ -135,12 +136,8 @@ fn an_answer_a_fault_and_silence_are_said_in_words() {
         name: "Oak wood".try_into().unwrap(),
         probability: 0.995,
         sure: true,
-        unknown: false,
-        log_odds: None,
         slides: 1,
-        wants_label: false,
-        changed: false,
-        most_like: false,
+        ..Verdict::default()
     }));
     let mut monitor = heard(events.clone());
     assert!(
@@ -185,11 +182,8 @@ fn a_trace_reaches_both_ends_of_its_scale() {
         };
         Event::Block(Block {
             number,
-            still: false,
-            steady: None,
             pac: (0..64).map(sample).collect(),
-            shear_mn: Default::default(),
-            lost: 0,
+            ..Block::default()
         })
     });
     let monitor = heard(blocks);
@@ -290,12 +284,8 @@ fn what_was_stopped_is_shown_no_more() {
 #[test]
 fn between_slides_the_trace_is_said_to_be_the_last_ones() {
     let block = Event::Block(Block {
-        number: 0,
-        still: false,
-        steady: None,
         pac: (0..64).collect(),
-        shear_mn: Default::default(),
-        lost: 0,
+        ..Block::default()
     });
     let mut events = vec![Event::Phase(Phase::Sliding), block];
     let sliding = heard(events.clone());
