@@ -1,5 +1,6 @@
-// A holder that hangs the finger beside a 3D printer's nozzle, or on the lever of the rig. The finger rides on a vertical
-// ball slide and rests on a stop by its own weight: nothing but that weight, friction and inertia presses. Millimetres.
+// A holder that hangs the finger beside a 3D printer's nozzle, or on the lever of the rig. The finger rides on a
+// vertical ball slide and rests on a stop by its own weight: nothing but that weight, friction and inertia presses.
+// Millimetres. A test weighs it again from these measures, and the book's table of forces is made of them.
 // openscad -D 'part="back"' -o back.stl hardware/printer.scad
 // part: "back", "carriage", "corner", "saddle", "clamp", "tray", or "assembly", "assembly_v6" to look at.
 part = "assembly";
@@ -45,6 +46,7 @@ aluminium = 2.7e-3;
 petg = 1.27e-3;
 filled = 0.8;         // share of a printed part that is not air: 4 walls, 40 %
 carriage_volume = 22649; // mm3, of carriage.stl
+carriage_middle = -30.9; // of its mass, x
 screws_mass = 14;     // g: 4 M3 x 8, 2 M5 x 16, 2 M4 x 8, M3 x 12 of the stop
 cable_mass = 4;       // g: the half of its loop that the carriage bears
 
