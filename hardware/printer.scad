@@ -135,7 +135,7 @@ module carriage() {
 }
 
 aside = pattern / 2 + 8;
-turned = pattern + 18;
+turned = pattern + 20;
 // Turns the slide by 90 degrees, for a finger that slides along Y.
 module corner() {
   low = pattern_up - turned / 2;
@@ -144,7 +144,7 @@ module corner() {
       translate([-pattern / 2 - 7, plate, low]) upright([pattern / 2 + 7 + aside + plate, plate, turned]);
       translate([aside, -turned, low]) cube([plate, turned + plate, turned]);
       // what stiffens it, below the screws
-      translate([aside, 0, low]) linear_extrude(4) polygon([[0, 0], [-12, 0], [0, 8 - turned]]);
+      translate([aside, 0, low]) linear_extrude(3) polygon([[0, 0], [-12, 0], [0, 8 - turned]]);
     }
     translate([0, plate, 0]) slots(plate);
     translate([aside, -turned / 2, 0]) rotate([0, 0, 90]) slots(plate, 0);
