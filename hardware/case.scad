@@ -15,7 +15,7 @@ optics_board = [26, 26, 2];
 window = [24, 13];           // the display's lit part
 button = 12.2;
 rocker = [19.4, 13.2];       // switch KCD1
-sound = 9;                   // buzzer
+sound = 12.2;                // buzzer
 usb = [10, 8];
 gap = 0.6;
 
