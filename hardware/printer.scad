@@ -10,7 +10,7 @@ pattern = 32;         // between two of its four screws
 pattern_up = 33;      // its middle above the nozzle's tip. Measure yours
 pattern_play = 4;     // up and down
 fan = 10;             // thickness of the fan that stays behind the holder
-heat_sink = [22.3, 20]; // of a V6: diameter and length that the clamp grips; [16, 3.6] grips its collar
+heat_sink = [22.3, 20]; // of a V6: diameter and length that the clamp grips; [16, 12] grips its collar
 
 // The finger, as in finger.scad.
 cell = [80, 12.7, 12.7];
@@ -154,6 +154,7 @@ module corner() {
 // Half a clamp for a round heat sink; holder or corner is screwed to its flat side.
 depth = heat_sink[0] / 2 + 8;
 ear = heat_sink[0] / 2 + 5;
+apart = heat_sink[1] < 18 ? 0 : heat_sink[1] - 10;
 module saddle() {
   difference() {
     union() {
@@ -163,7 +164,7 @@ module saddle() {
     grip();
     translate([0, plate, 0]) slots(plate, 0);
     // nuts M3 that lie in the flat side
-    translate([0, 2.6, pattern_up]) four([2 * ear, max(0, heat_sink[1] - 10)]) rotate([0, 0, 30]) cylinder(d = 6.5, h = 4, $fn = 6);
+    translate([0, 2.6, pattern_up]) four([2 * ear, apart]) rotate([0, 0, 30]) cylinder(d = 6.5, h = 4, $fn = 6);
   }
 }
 module clamp() {
@@ -174,7 +175,7 @@ module clamp() {
 }
 module grip() {
   translate([0, depth, 0]) cylinder(d = heat_sink[0] + 0.2, h = 200);
-  translate([0, 60, pattern_up]) four([2 * ear, max(0, heat_sink[1] - 10)]) cylinder(d = 3.4, h = 70);
+  translate([0, 60, pattern_up]) four([2 * ear, apart]) cylinder(d = 3.4, h = 70);
 }
 
 // Ties the NUCLEO to the printer's profile.
