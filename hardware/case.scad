@@ -15,7 +15,7 @@ optics_board = [26, 26, 2];
 window = [24, 13];           // the display's lit part
 button = 12.2;
 rocker = [19.4, 13.2];       // switch KCD1
-sound = 9;                   // buzzer
+sound = 12.2;                // buzzer
 usb = [10, 8];
 gap = 0.6;
 
@@ -52,8 +52,8 @@ module body() {
     }
     // the cell's held end
     for (x = [0, cell_holes]) translate([cell_front - cell[0] + 8 + x, outside[1] / 2, -standoff - 1]) cylinder(d = cell_screw, h = wall + standoff + 2);
-    // the stop, M3, above the cell's free end: turned down until a gap of a sheet of paper is left
-    translate([cell_front - 6, outside[1] / 2, -1]) cylinder(d = 2.6, h = wall + 2);
+    // the stop, M3, above the cell's free end, between its two screws: turned down until a gap of a sheet of paper is left
+    translate([cell_front - 10, outside[1] / 2, -1]) cylinder(d = 2.6, h = wall + 2);
     // cable of cell and tip
     translate([cell_front - cell[0] - 6, outside[1] / 2 - 4, -1]) cube([5, 8, wall + 2]);
     // what the optical sensor looks through, beside the tip

@@ -3,6 +3,8 @@
 //!
 //! `TACTUS_BOOK=write` (`cargo xtask docs --write`) writes the generated parts, the recordings and the pictures.
 
+#[path = "book/holder.rs"]
+mod holder;
 #[path = "book/parts.rs"]
 mod parts;
 #[path = "book/schema.rs"]

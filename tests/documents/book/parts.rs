@@ -31,6 +31,7 @@ pub(super) fn from_sources() -> Vec<(&'static str, &'static str, String)> {
         ("docs/src/tests.md", "xtask", xtask()),
         ("docs/src/bring-up.md", "steps", steps()),
         ("docs/src/bring-up.md", "mistakes", mistakes()),
+        ("docs/src/printer.md", "force", super::holder::force()),
     ]
 }
 
