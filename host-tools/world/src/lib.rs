@@ -27,6 +27,7 @@ pub mod noise;
 pub mod parts;
 pub mod person;
 pub mod played;
+pub mod printer;
 pub mod ripple;
 pub mod sensor;
 pub mod slot;

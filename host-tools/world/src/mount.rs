@@ -8,6 +8,8 @@ const SETTLES_N_PER_MM: f64 = 20.0;
 pub struct Mount {
     preload_n: f64,
     n_per_mm: f64,
+    /// Friction of its slide, N.
+    rubs_n: f64,
     /// Yield of the spring, mm.
     pub(super) pushed_mm: f64,
 }
@@ -17,6 +19,7 @@ impl Mount {
     pub const STIFF: Self = Self {
         preload_n: f64::INFINITY,
         n_per_mm: 0.0,
+        rubs_n: 0.0,
         pushed_mm: 0.0,
     };
     /// The one that the book's list of parts names. It lies still at the probe's forces, 1.26 N and what a slide adds;
@@ -24,6 +27,7 @@ impl Mount {
     pub const SPRUNG: Self = Self {
         preload_n: 1.45,
         n_per_mm: 0.04,
+        rubs_n: 0.0,
         pushed_mm: 0.0,
     };
 
@@ -32,12 +36,24 @@ impl Mount {
     pub const FOR_2_N: Self = Self {
         preload_n: 2.05,
         n_per_mm: 0.009,
+        rubs_n: 0.0,
         pushed_mm: 0.0,
     };
+
+    /// A carriage that lies on its stop by a weight, N, and rubs on its slide, N.
+    pub(super) const fn weighted(weight_n: f64, rubs_n: f64) -> Self {
+        Self {
+            preload_n: weight_n,
+            n_per_mm: 0.0,
+            rubs_n,
+            pushed_mm: 0.0,
+        }
+    }
 
     /// A tick with this force on the finger, N.
     pub(super) fn tick(&mut self, force_n: f64) {
         let over_n = force_n - self.preload_n - self.n_per_mm * self.pushed_mm;
+        let over_n = over_n - over_n.clamp(-self.rubs_n, self.rubs_n);
         self.pushed_mm = (self.pushed_mm + over_n / SETTLES_N_PER_MM).max(0.0);
     }
 }

@@ -7,6 +7,7 @@ use crate::finger::Held;
 use crate::mount::Mount;
 use crate::person::Hand;
 use crate::played::{PlayCounts, Played};
+use crate::printer::Printer;
 
 impl World {
     /// Inclines the stage with a weight on it, so that it is pulled towards lower positions with `pull_n` (paper,
@@ -55,6 +56,19 @@ impl World {
     pub fn arm(&mut self) -> Option<&mut Arm> {
         match &mut self.holder {
             Some(Holder::Arm(arm)) => Some(arm),
+            _ => None,
+        }
+    }
+
+    /// Has a printer hold the finger from now on, in place of lever and stage, which move without it.
+    pub fn mount_on_printer(&mut self, printer: Printer) {
+        self.holder = Some(Holder::Printer(Box::new(printer)));
+    }
+
+    /// The printer that holds the finger.
+    pub fn printer(&mut self) -> Option<&mut Printer> {
+        match &mut self.holder {
+            Some(Holder::Printer(printer)) => Some(printer),
             _ => None,
         }
     }

@@ -1,12 +1,14 @@
-//! The holder of the finger in place of lever and stage: a hand, or an arm.
+//! The holder of the finger in place of lever and stage: a hand, an arm, or a printer.
 
 use crate::arm::Arm;
 use crate::finger::Held;
 use crate::person::Hand;
+use crate::printer::Printer;
 
 pub(super) enum Holder {
     Hand(Box<Hand>),
     Arm(Box<Arm>),
+    Printer(Box<Printer>),
 }
 
 impl Holder {
@@ -15,6 +17,7 @@ impl Holder {
         match self {
             Self::Hand(hand) => hand.tick(force_n),
             Self::Arm(arm) => arm.tick(),
+            Self::Printer(printer) => printer.tick(force_n),
         }
     }
 
@@ -22,6 +25,7 @@ impl Holder {
         match self {
             Self::Hand(hand) => hand.held(),
             Self::Arm(_) => Held::STILL,
+            Self::Printer(printer) => printer.held(),
         }
     }
 
@@ -31,6 +35,11 @@ impl Holder {
         match self {
             Self::Hand(hand) => [hand.indentation_mm, hand.x_mm(), hand.speed_mm_s],
             Self::Arm(arm) => [arm.indentation_mm(), arm.x_mm(), arm.speed_mm_s()],
+            Self::Printer(printer) => [
+                printer.indentation_mm(),
+                printer.x_mm(),
+                printer.speed_mm_s(),
+            ],
         }
     }
 }
