@@ -19,6 +19,7 @@ pub mod log;
 pub mod operations;
 pub mod person;
 mod port;
+pub mod printer;
 pub mod probe;
 mod request;
 pub mod samples;

@@ -146,15 +146,24 @@ pub fn found() -> Vec<PortInfo> {
 pub trait Line: Read + Write + Send {}
 impl<T: Read + Write + Send> Line for T {}
 
-/// Opens the port of this name, and keeps other commands from it.
+/// Opens the probe's port of this name, and keeps other commands from it.
 pub fn open(name: &str) -> Result<(Box<dyn Line>, PortLock), LineError> {
+    open_at(name, BAUD, READ)
+}
+
+/// Opens a port of another baud rate, whose reads come back after this time.
+pub fn open_at(
+    name: &str,
+    baud: u32,
+    reads: Duration,
+) -> Result<(Box<dyn Line>, PortLock), LineError> {
     // however its address was written
     let same = tcp_address(name).map(|address| format!("tcp:{address}"));
     let lock = PortLock::take(same.as_deref().unwrap_or(name));
     let lock = lock.ok_or_else(|| LineError::InUse(name.to_owned()))?;
     let line = match tcp_address(name) {
-        Some(address) => tcp(address)?,
-        None => serial(name)?,
+        Some(address) => tcp_at(address, reads)?,
+        None => serial(name, baud, reads)?,
     };
     Ok((line, lock))
 }
@@ -178,11 +187,11 @@ fn tcp_address(name: &str) -> Option<&str> {
     })
 }
 
-fn serial(port: &str) -> Result<Box<dyn Line>, LineError> {
+fn serial(port: &str, baud: u32, reads: Duration) -> Result<Box<dyn Line>, LineError> {
     use io::ErrorKind as Io;
     use serialport::ErrorKind as Serial;
     let port = port.to_owned();
-    let why = match serialport::new(&port, BAUD).timeout(READ).open() {
+    let why = match serialport::new(&port, baud).timeout(reads).open() {
         Ok(line) => return Ok(Box::new(line)),
         Err(why) => why,
     };
@@ -200,6 +209,10 @@ fn serial(port: &str) -> Result<Box<dyn Line>, LineError> {
 
 /// Opens a TCP port, "HOST:PORT".
 pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
+    tcp_at(address, READ)
+}
+
+fn tcp_at(address: &str, reads: Duration) -> Result<Box<dyn Line>, LineError> {
     let error = |why| LineError::Tcp {
         address: address.to_owned(),
         why,
@@ -208,7 +221,7 @@ pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
     let to = to.ok_or_else(|| error(io::ErrorKind::NotFound.into()))?;
     let stream = TcpStream::connect_timeout(&to, Duration::from_secs(5)).map_err(error)?;
     stream
-        .set_read_timeout(Some(READ))
+        .set_read_timeout(Some(reads))
         .and_then(|()| stream.set_write_timeout(Some(Duration::from_secs(5))))
         .and_then(|()| stream.set_nodelay(true))
         .map_err(error)?;

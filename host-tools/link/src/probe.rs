@@ -22,6 +22,7 @@ use super::lifting::{Lifting, RigWatch, Stopped, moves};
 use super::limits::Limits;
 use super::log::Line;
 use super::person::{Backup, Question, Words};
+use super::printer::Printer;
 use super::request::Request;
 use super::say::Prompts;
 use super::session::{LinkError, MAX_TRIES, Session};
@@ -72,6 +73,8 @@ struct State {
     movements: Option<usize>,
     /// of the request under way
     limits: Option<Limits>,
+    /// moves the finger
+    printer: Option<Printer>,
 }
 
 impl State {
@@ -113,6 +116,13 @@ impl State {
     fn hear(&mut self, reports: &[Report]) {
         for report in reports {
             self.rig.hear(report, self.now);
+            if let Some(printer) = &self.printer {
+                match &report.event {
+                    Event::Arm(order) => printer.order(*order),
+                    Event::Live(live) => printer.force(live.force_mn),
+                    _ => {}
+                }
+            }
             match &report.event {
                 Event::Status(status) => self.in_use = Some(status.table_crc),
                 Event::TextureLearned(_) | Event::Booted { .. } => self.in_use = None,
@@ -281,6 +291,16 @@ impl Probe {
         let mut state = self.state();
         state.received.extend_from_slice(received);
         state.now = now.max(state.now);
+        let reports = state.printer.as_ref().map(Printer::reports);
+        for report in reports.unwrap_or_default() {
+            // one that is lost is said again
+            let _ = state.send(Command::Arm(report));
+        }
+    }
+
+    /// Has a printer move the finger from now on.
+    pub fn move_by(&self, printer: Printer) {
+        self.state().printer = Some(printer);
     }
 
     /// Returns the bytes that are to be sent now.
@@ -568,7 +588,7 @@ impl Probe {
 }
 
 /// Lets whoever carries the bytes go on.
-async fn turn() {
+pub(crate) async fn turn() {
     let mut over = false;
     poll_fn(|_| match std::mem::replace(&mut over, true) {
         true => Poll::Ready(()),

@@ -32,6 +32,9 @@ const LIFTED_MN: f32 = 92.0;
 /// Excess over a movement's force that is a fault: a share of it, and mN. With 1.26 N that is 1.66 N: an arm that comes
 /// down at three times its speed limit stays below 2.2 N then, see `tests/core/arm.rs`.
 const TOO_HARD: (f32, f32) = (1.2, 150.0);
+/// Time over which that is taken while the finger slides, ms: a load cell rings with the texture, which P_DC, sampled
+/// slowly, shows as some 0.2 N (simulated `mems` at 63 mm/s).
+const RINGS_MS: f32 = 40.0;
 /// Force that is a fault while the finger is lifted or on its way, mN.
 const IN_AIR_MN: f32 = 500.0;
 /// The pressed finger's force may be off the movement's by a share of it, and counts of P_DC.
@@ -43,8 +46,9 @@ const SLIDE_OFF: (f32, f32) = (34.5, 0.25);
 const SLIDE_SHARE: f32 = 0.05;
 /// Longest silence of an arm about an open order, ms: five of its reports.
 const SILENT_MS: u32 = 500;
-/// Longest that an arm may take to press and to lift: across its table, and down the last centimetre at 1 mm/s, ms.
-const PRESSES_MS: u32 = 30_000;
+/// Longest that an arm may take to press and to lift: across its table, and down the last centimetre by steps of a
+/// printer that stands after each, ms.
+const PRESSES_MS: u32 = 60_000;
 const LIFTS_MS: u32 = 20_000;
 /// Longest from the order of a slide to its constant speed, and from its end to its report, ms.
 const RAMP_MS: u32 = 2000;
@@ -81,6 +85,8 @@ pub struct RigOverLink {
     air: Option<f32>,
     still: f32,
     expected_mn: f32,
+    /// Force of the slide, mean over some time, mN.
+    slid_mn: f32,
 }
 
 impl RigOverLink {
@@ -111,6 +117,7 @@ impl RigOverLink {
             air: None,
             still: 0.0,
             expected_mn: 0.0,
+            slid_mn: 0.0,
         }
     }
 
@@ -312,6 +319,11 @@ impl RigOverLink {
         for word in pdc.filter(|word| word.channel == Channel::Pdc) {
             self.meter.push(word.counts);
         }
+        let force_mn = self.force_mn();
+        self.slid_mn = match self.phase {
+            Phase::Sliding => self.slid_mn + (force_mn - self.slid_mn) / RINGS_MS,
+            _ => force_mn,
+        };
         let mut outputs = Outputs::default();
         match self.watch(inputs) {
             Some(fault) => self.fail(fault),
@@ -342,12 +354,15 @@ impl RigOverLink {
             }
             // the arm's task before is unknown
             Phase::Homing => most_mn,
-            _ => {
-                let (share, mn) = TOO_HARD;
-                f32::from(self.movement.force_mn()) * share + mn
-            }
+            Phase::Sliding => most_mn,
+            _ => self.too_hard_mn(),
         };
         limit_mn.min(most_mn)
+    }
+
+    fn too_hard_mn(&self) -> f32 {
+        let (share, mn) = TOO_HARD;
+        f32::from(self.movement.force_mn()) * share + mn
     }
 
     /// The guard's fault, from sensor and force; all else belongs to the arm.
@@ -369,7 +384,11 @@ impl RigOverLink {
         );
         let fault = self
             .guard
-            .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn)?;
+            .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn);
+        let slides_hard = self.phase == Phase::Sliding
+            && self.slid_mn > self.too_hard_mn()
+            && self.guard.looks_for(Fault::ForceHigh);
+        let fault = fault.or(slides_hard.then_some(Fault::ForceHigh))?;
         match (self.phase, fault) {
             // before P_DC in the air is known, its height is meaningless
             (_, Fault::ForceHigh) if !self.knows_air() => None,
