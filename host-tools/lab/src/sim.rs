@@ -8,6 +8,7 @@ pub mod fault_case;
 pub mod flash;
 pub mod handheld;
 pub mod over_link;
+pub mod printer;
 pub mod probe;
 pub mod recorded;
 pub mod rig;

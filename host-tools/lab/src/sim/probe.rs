@@ -16,7 +16,7 @@ use tactus_core::store::{Store, StoreError};
 use tactus_core::wire::Event;
 
 use super::flash::RamFlash;
-use super::over_link::ArmRig;
+use super::over_link::{ArmRig, Mover};
 use super::rig::SimRig;
 
 /// The other end of a simulated probe.
@@ -61,6 +61,11 @@ pub trait Host {
 pub trait Driven {
     /// See [`Servo::has_stage`].
     const HAS_STAGE: bool;
+
+    /// Its finger.
+    fn finger(&self) -> FingerCode {
+        FingerCode::BIOTAC
+    }
 
     /// A millisecond passes.
     fn tick(&mut self) -> &Outputs;
@@ -132,8 +137,12 @@ impl Driven for SimRig {
     }
 }
 
-impl Driven for ArmRig {
+impl<M: Mover> Driven for ArmRig<M> {
     const HAS_STAGE: bool = false;
+
+    fn finger(&self) -> FingerCode {
+        Self::finger(self)
+    }
 
     fn tick(&mut self) -> &Outputs {
         Self::tick(self)
@@ -265,11 +274,11 @@ impl<H: Host, R: Driven> Servo for SimServo<'_, H, R> {
 
 /// The stored table, copied out of the flash.
 #[derive(Debug, Default)]
-pub struct TableCopy(Vec<u8>);
+pub struct TableCopy(Vec<u8>, FingerCode);
 
 impl<const S: usize> StoredBytes<RamFlash<S>> for TableCopy {
     fn finger(&self) -> FingerCode {
-        FingerCode::BIOTAC
+        self.1
     }
 
     fn bytes(&mut self, store: &mut Store<RamFlash<S>>) -> Option<&[u8]> {
@@ -311,6 +320,7 @@ pub fn switch_on<'p, H: Host, R: Driven>(
     plan: &'p Plan,
     host: &'p RefCell<H>,
 ) -> Result<SimProbe<'p, H, R>, StoreError> {
+    let copy = TableCopy(Vec::new(), rig.finger());
     let mut rig = ServoRig::new(SimServo::new(rig, host));
     let mut store = block_on(Store::open(flash))?;
     for done in [
@@ -323,7 +333,7 @@ pub fn switch_on<'p, H: Host, R: Driven>(
     }
     let mut probe = Probe {
         rig,
-        memory: Memory::new(Ok(store), TableCopy::default(), factory, buffer),
+        memory: Memory::new(Ok(store), copy, factory, buffer),
         events: HostSink(host),
         plan,
     };

@@ -257,7 +257,7 @@ fn files_of_other_kinds_say_what_to_do() {
         (b"MATLAB 5.0", "numpy.save"),
         (b"\x7fELF\x02\x01\x01\0", "save it as one of them"),
         (b"PK\x03\x04xx", "save it again"),
-        (b"PAR1xx", "save it as CSV"),
+        (b"PAR1xx", "pandas.read_parquet"),
     ] {
         let why = Signals::of(begin).unwrap_err();
         assert!(why.contains(part), "{why}");
