@@ -8,6 +8,7 @@ mod error;
 mod evaluate;
 mod explorer;
 mod features;
+mod printer;
 mod probe;
 mod recordings;
 mod rows;
@@ -30,6 +31,7 @@ fn _tactus(module: &Bound<'_, PyModule>) -> PyResult<()> {
     evaluate::add(module)?;
     explorer::add(module)?;
     simulate::add(module)?;
+    printer::add(module)?;
     probe::add(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

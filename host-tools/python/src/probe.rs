@@ -39,7 +39,7 @@ use crate::work::work;
 #[pyclass(frozen, module = "tactus")]
 pub(crate) struct Probe {
     name: String,
-    linked: Linked,
+    pub(crate) linked: Linked,
     opened_by: u32,
     inner: Mutex<Option<Inner>>,
 }

@@ -9,6 +9,7 @@ mod identify;
 mod line;
 mod log;
 mod monitor;
+mod printer;
 mod record;
 mod rename;
 mod status;
@@ -69,6 +70,8 @@ Examples:
     Stop(line::Where),
     Flash(flash::Args),
     Bringup(bringup::Args),
+    #[command(subcommand)]
+    Printer(printer::Command),
     Log(log::Args),
 }
 
@@ -98,6 +101,7 @@ fn perform(command: &Command, out: &mut impl Write) -> anyhow::Result<Done> {
         Command::Stop(at) => calibrate::stop(at, out),
         Command::Flash(args) => flash::run(args, out),
         Command::Bringup(args) => bringup::run(args, out),
+        Command::Printer(command) => printer::run(command, out),
         Command::Log(args) => log::run(args, out),
     };
     done.map(|()| Done::Fully)

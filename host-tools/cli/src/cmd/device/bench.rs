@@ -18,10 +18,12 @@ use tactus_link::line::{Line, LineError};
 use tactus_link::lock::PortLock;
 use tactus_link::log::{self, Log};
 use tactus_link::person::{Question, QuestionKind};
+use tactus_link::printer::OpenPrinter;
 use tactus_link::probe::{GREETING, TIMEOUT};
 use tactus_link::{OperationError, Port, Probe, Transaction};
 
 use super::line::{Consent, Where};
+use super::printer;
 use crate::cmd::output::Format;
 use crate::cmd::printed::{prompt as ask_for, say};
 
@@ -41,6 +43,9 @@ pub(crate) enum BenchError {
     /// There can be no log, or what is shown cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// The printer's set-up is not there, or cannot be kept.
+    #[error("{0}")]
+    Printer(String),
     #[error("nothing was changed: there is nobody to ask; add --yes to do it")]
     Nobody,
     #[error("nothing was changed: {} is there already: give --backup another name, or --force", .0.display())]
@@ -89,8 +94,11 @@ pub(crate) struct Bench {
     log: Option<Log>,
     format: Format,
     pub(crate) consent: Consent,
+    /// Answers may be lines that are no terminal's, as in a bring-up.
+    pub(crate) takes_lines: bool,
     /// what failed here while an operation is being stopped
     failed: Option<BenchError>,
+    printer: Option<OpenPrinter>,
     _lock: PortLock,
 }
 
@@ -108,12 +116,24 @@ impl Bench {
             log: log.transpose()?,
             format,
             consent: Consent::default(),
+            takes_lines: false,
             failed: None,
+            printer: None,
             name: open.name,
             _lock: open.lock,
         };
+        if let Some(port) = &place.printer {
+            let file = place.printer_setup.as_deref();
+            bench.move_by(printer::open(port, file)?);
+        }
         let status = bench.done(probe.hello(), &mut io::sink())?;
         Ok((bench, status))
+    }
+
+    /// Has a printer move the finger.
+    pub(crate) fn move_by(&mut self, printer: OpenPrinter) {
+        self.probe.move_by(printer.printer.clone());
+        self.printer = Some(printer);
     }
 
     /// Does an operation, and prints its words where they are for people. Whatever ends it early leaves the rig stopped
@@ -151,6 +171,13 @@ impl Bench {
         if self.format == Format::Text && !words.is_empty() {
             let shown = out.write_all(&words).and_then(|()| out.flush());
             shown.unwrap_or_else(|why| self.fails(why.into()));
+        }
+        let failure = self
+            .printer
+            .as_ref()
+            .and_then(|by| by.printer.take_failure());
+        if let Some(why) = failure {
+            say(format_args!("Printer: {why}"));
         }
         if let Some(backup) = self.probe.backup() {
             let kept = self.consent.keep(&backup.bytes);
@@ -205,7 +232,9 @@ impl Bench {
                 if self.consent.yes {
                     return Ok(Some(true));
                 }
-                self.consent.can_be_given()?;
+                if !self.takes_lines {
+                    self.consent.can_be_given()?;
+                }
                 format!("{asked} [y/N] ")
             }
             QuestionKind::Moved => format!("{asked}, then press Enter (n: it stays): "),
@@ -260,6 +289,11 @@ static UNKEPT: OnceLock<io::Error> = OnceLock::new();
 
 impl Drop for Bench {
     fn drop(&mut self) {
+        if let Some(Err(why)) = self.printer.as_mut().map(OpenPrinter::close) {
+            say(format_args!(
+                "where the printer is parked was not kept: {why}"
+            ));
+        }
         if let Some(Err(why)) = self.log.as_mut().map(Log::finish) {
             // the first one is told
             let _ = UNKEPT.set(why);

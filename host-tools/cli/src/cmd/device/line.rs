@@ -21,6 +21,13 @@ pub(crate) struct Where {
     /// Its serial port, or HOST:PORT; that of TACTUS_PORT, or the only NUCLEO that is plugged in, unless given
     #[arg(long, value_name = "PORT")]
     pub(crate) port: Option<String>,
+    /// A 3D printer moves the finger: its serial port, or HOST:PORT; that of its set-up unless given. For the firmware
+    /// `tactus-arm`; see `tactus device printer --help`
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "")]
+    pub(crate) printer: Option<String>,
+    /// File of the printer's set-up, and not ~/.local/share/tactus/printer.json
+    #[arg(long, value_name = "FILE", requires = "printer")]
+    pub(crate) printer_setup: Option<PathBuf>,
     /// Write all requests and reports to this file, for `tactus device log`
     #[arg(long, value_name = "FILE")]
     pub(crate) log: Option<PathBuf>,
@@ -115,14 +122,17 @@ impl Consent {
 }
 
 fn folder() -> anyhow::Result<PathBuf> {
+    in_data_home("backups", "name a file with --backup")
+}
+
+/// A folder of the user's data.
+pub(super) fn in_data_home(name: &str, otherwise: &str) -> anyhow::Result<PathBuf> {
     let data = named("XDG_DATA_HOME").map(PathBuf::from);
     let data = data.or_else(|| Some(PathBuf::from(named("HOME")?).join(".local/share")));
-    let data = data.context(
-        "there is no home folder to keep the probe's table in: name a file with --backup",
-    )?;
-    let folder = data.join("tactus/backups");
+    let data = data.with_context(|| format!("there is no home folder to write to: {otherwise}"))?;
+    let folder = data.join("tactus").join(name);
     std::fs::create_dir_all(&folder)
-        .with_context(|| format!("{}: name another file with --backup", folder.display()))?;
+        .with_context(|| format!("{}: {otherwise}", folder.display()))?;
     Ok(folder)
 }
 
