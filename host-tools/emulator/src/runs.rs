@@ -4,6 +4,7 @@ pub mod bench;
 pub mod faults;
 mod handheld;
 mod identify;
+mod printer;
 mod serve;
 mod stack_depth;
 
@@ -32,6 +33,12 @@ enum Cli {
     #[command(after_help = "Example:
   tactus-emulator handheld --elf tactus-handheld --seed 7         a texture drawn by the seed")]
     Handheld(handheld::Args),
+    /// Have the command `tactus device identify` find out what lies under a finger that hangs on a simulated 3D printer
+    ///
+    /// Board and printer are served at two TCP ports; the command is the one that a person uses.
+    #[command(after_help = "Example:
+  tactus-emulator printer --elf tactus-arm --tactus target/debug/tactus --finger mems --among 6")]
+    Printer(printer::Args),
     /// Serve the board's serial port on a TCP port of this PC
     ///
     /// Virtual time then goes no faster than real time.
@@ -51,6 +58,7 @@ fn run(cli: &Cli) -> Result<bool> {
     match cli {
         Cli::Identify(args) => identify::run(args)?,
         Cli::Handheld(args) => handheld::run(args)?,
+        Cli::Printer(args) => return printer::run(args),
         Cli::Serve(args) => serve::run(args)?,
         Cli::Faults(args) => return faults::run(args),
         Cli::Bench(args) => return bench::run(args),

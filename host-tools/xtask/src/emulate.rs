@@ -13,6 +13,7 @@ Examples:
   cargo xtask emulate --texture 10 --log     with the firmware's own log
   cargo xtask emulate --finger mems          with another finger: analog or mems
   cargo xtask emulate --handheld             a hand that explores with the handheld
+  cargo xtask emulate --printer              a 3D printer that moves the finger mems, by `tactus device identify`
   cargo xtask emulate --handheld --motion    with a sensor of motion, too
   cargo xtask emulate --port 7429            serves its serial port at tcp:127.0.0.1:7429 instead
   cargo xtask emulate --help                 all options";
@@ -25,12 +26,20 @@ pub(crate) const ARM: &str = "tactus-arm";
 /// Has the firmware identify a texture, the rig's or with `--handheld` the handheld's, or serves its serial port where
 /// a TCP port for it is given.
 pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
-    let (by_hand, options): (Vec<_>, Vec<_>) =
-        options.iter().cloned().partition(|o| o == "--handheld");
-    let run = match (by_hand.is_empty(), value(&options, "--port")) {
-        (false, _) => "handheld",
-        (true, Some(_)) => "serve",
-        (true, None) => "identify",
+    let (others, mut options): (Vec<_>, Vec<_>) = options
+        .iter()
+        .cloned()
+        .partition(|o| o == "--handheld" || o == "--printer");
+    let run = match (others.first(), value(&options, "--port")) {
+        (Some(other), _) if other == "--printer" => {
+            shell::run(workspace("build").args(["-p", "tactus-probe"]))?;
+            options.push("--tactus".into());
+            options.push(target().join("debug/tactus").into());
+            "printer"
+        }
+        (Some(_), _) => "handheld",
+        (None, Some(_)) => "serve",
+        (None, None) => "identify",
     };
     shell::run(&mut command(run, &options)?)
 }
@@ -59,7 +68,13 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
         } else {
             let image = match run {
                 "handheld" => HANDHELD,
-                _ if value(options, "--arm-port").is_some() => ARM,
+                "printer" => ARM,
+                _ if ["--arm-port", "--printer-port"]
+                    .iter()
+                    .any(|port| value(options, port).is_some()) =>
+                {
+                    ARM
+                }
                 _ => RIG,
             };
             Some(firmware::compile(&[image])?.remove(0))
