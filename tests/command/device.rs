@@ -11,6 +11,8 @@ mod lines;
 mod package;
 #[path = "device/page.rs"]
 mod page;
+#[path = "device/printer.rs"]
+mod printer;
 #[path = "device/software.rs"]
 mod software;
 #[path = "device/tables.rs"]

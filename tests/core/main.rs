@@ -19,6 +19,7 @@ mod page;
 mod played;
 mod press;
 mod presses;
+mod printer;
 mod recordings;
 mod refresh;
 mod rigs;

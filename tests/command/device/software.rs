@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::Command;
+use std::rc::Rc;
 use std::sync::OnceLock;
 use std::sync::mpsc::{self, Receiver as Told, Sender};
 use std::thread;
@@ -14,14 +15,16 @@ use serde_json::Value;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::Method;
 use tactus_core::probe::seams::{Panel, RigHandle as _};
+use tactus_core::probe::servo_rig::Servo as _;
 use tactus_core::probe::{RigState, TableInUse, Turn, Watch, receive};
+use tactus_core::rig::arm::{ArmOrder, ArmReport};
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::skin::SkinCare;
 use tactus_core::sensor::FingerCode;
 use tactus_core::wire::{self, Counts, Event, MAX_FRAME, Receiver, Report, Request};
 use tactus_lab::sim::collection::{Collection, calibrated};
 use tactus_lab::sim::flash::{RamFlash, TABLE};
-use tactus_lab::sim::probe::{self, Host};
+use tactus_lab::sim::probe::{self, Driven, Host};
 use tactus_lab::sim::rig::SimRig;
 
 use crate::Scratch;
@@ -124,6 +127,15 @@ pub(super) struct Wire {
     /// all commands that came, for the test
     asked: Sender<wire::Command>,
     gone: bool,
+    /// what is said to the arm that moves its finger, and by it
+    pub(super) arm: Option<ToArm>,
+}
+
+/// Orders to an arm, and its reports; time goes as it does for the arm's own clock since then.
+#[derive(Clone)]
+pub(super) struct ToArm {
+    pub(super) said: Rc<RefCell<(Vec<ArmOrder>, Vec<ArmReport>)>>,
+    pub(super) began: Instant,
 }
 
 impl Wire {
@@ -181,6 +193,12 @@ impl Panel for Wire {
         self.streams = on;
     }
 
+    fn arm(&mut self, report: ArmReport) -> bool {
+        let arm = self.arm.as_ref();
+        arm.map(|arm| arm.said.borrow_mut().1.push(report))
+            .is_some()
+    }
+
     fn tell(&mut self, tell: Event) {
         let report = Report {
             number: self.number,
@@ -208,8 +226,21 @@ impl Host for Wire {
         self.rig = *rig;
         if self.at_ms.is_multiple_of(Watch::EVERY_MS) {
             let mut watch = self.watch;
-            watch.look(rig, |event| Panel::tell(self, event));
+            match self.arm {
+                Some(_) => watch.look_for_arm(rig, |event| Panel::tell(self, event)),
+                None => watch.look(rig, |event| Panel::tell(self, event)),
+            }
             self.watch = watch;
+        }
+        if let Some(arm) = self.arm.clone() {
+            let orders = std::mem::take(&mut arm.said.borrow_mut().0);
+            for order in orders {
+                Panel::tell(self, Event::Arm(order));
+            }
+            self.look();
+            let behind = now.saturating_sub(arm.began.elapsed());
+            thread::sleep(behind);
+            return;
         }
         if self.at_ms.is_multiple_of(self.hurry) {
             self.look();
@@ -240,7 +271,20 @@ pub(super) fn serve(
     let mut rig = SimRig::new(world().setup(UNKNOWN, 100));
     rig.control().calibrate(*calibration).unwrap();
     rig.home().unwrap();
+    serve_rig(lines, rig, (factory, hurry), asked, None);
+}
+
+/// The same with this rig.
+pub(super) fn serve_rig<R: Driven>(
+    lines: impl IntoIterator<Item = Box<dyn Line>>,
+    mut rig: R,
+    (factory, hurry): (&[u8], u64),
+    asked: Sender<wire::Command>,
+    arm: Option<ToArm>,
+) {
+    let is_ours = arm.is_none();
     let wire = RefCell::new(Wire {
+        arm,
         line: Box::new(std::io::empty()),
         receiver: Receiver::default(),
         number: 0,
@@ -261,13 +305,17 @@ pub(super) fn serve(
     let flash = RamFlash::blank();
     let probe = probe::switch_on(rig, flash, factory, &mut buffer, &plan, &wire);
     let mut probe = probe.unwrap();
-    embassy_futures::block_on(probe.rig.set_skin(SkinCare::after(1.5, 0.25)));
+    if is_ours {
+        embassy_futures::block_on(probe.rig.set_skin(SkinCare::after(1.5, 0.25)));
+    }
     for line in lines {
         wire.borrow_mut().line = line;
         wire.borrow_mut().gone = false;
         while !wire.borrow().gone {
             wire.borrow_mut().look();
-            thread::sleep(Duration::from_millis(1));
+            if is_ours {
+                thread::sleep(Duration::from_millis(1));
+            }
             let request = wire.borrow_mut().requests.pop_front();
             let Some(request) = request else {
                 probe.rig.servo.tick();
@@ -278,12 +326,12 @@ pub(super) fn serve(
             let mut wire = wire.borrow_mut();
             (wire.busy, wire.stopped) = (false, false);
             // its finger really is in the air
-            assert!(probe.rig.servo.rig().world().truth().force_n == 0.0);
+            assert!(!is_ours || probe.rig.servo.state().force_mn < 50.0);
         }
     }
 }
 
-fn listen() -> (TcpListener, String) {
+pub(super) fn listen() -> (TcpListener, String) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let at = format!("tcp:{}", listener.local_addr().unwrap());
     (listener, at)
