@@ -292,9 +292,11 @@ fn explorations_are_right(finger: FingerName, kind: Kind) {
         }));
     }
     off.sort_by(f64::total_cmp);
-    let (median, worst) = (off[off.len() / 2], off[off.len() - 1]);
+    let middle = [(off.len() - 1) / 2, off.len() / 2].map(|n| off[n]);
+    let (median, worst) = ((middle[0] + middle[1]) / 2.0, off[off.len() - 1]);
     println!(
-        "{finger:?} {kind:?}: {right} of {all} right, {:.0} s each; force off by {:.1} % (median), {:.1} % (worst of {} slides)",
+        "{finger:?} {kind:?}: {right} of {all} right, {:.0} s each; force off by {:.1} % (median), \
+         {:.1} % (worst of {} slides)",
         seconds / all as f64,
         100.0 * median,
         100.0 * worst,
@@ -401,7 +403,8 @@ fn whatever_breaks_the_finger_never_feels_more_than_it_bears() {
     assert_all(all, |&(kind, when, what, seed)| {
         let ended = broken(kind, when, what, seed);
         let said = format!(
-            "{kind:?} {when:?} {what:?} {seed}: {:?} slides {} faults {:?} {:?} max {:.2} N left {:.2} N misused {} in {:.0} s",
+            "{kind:?} {when:?} {what:?} {seed}: {:?} slides {} faults {:?} {:?} max {:.2} N \
+             left {:.2} N misused {} in {:.0} s",
             ended.done,
             ended.heard.slides,
             ended.heard.faults,

@@ -40,8 +40,8 @@ const OVER_MM: (f64, f64) = (2.0, 4.0);
 const TILT_MM: f64 = 0.3;
 /// Height of the sample over the bed, mm: beside it there is nothing to touch before.
 const THICK_MM: f64 = 3.0;
-/// The finger's carriage lies on its stop by its weight of 148 g, N, and rubs on its ball slide, N: it moves beyond that
-/// (the book's page of the holder).
+/// The finger's carriage lies on its stop by its weight of 148 g, N, and rubs on its ball slide, N: it moves beyond
+/// that (the book's page of the holder).
 const WEIGHS_N: f64 = 1.45;
 const RUBS_N: (f64, f64) = (0.16, 0.40);
 /// Axes end there, mm: a screw stalls.

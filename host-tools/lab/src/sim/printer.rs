@@ -14,7 +14,7 @@ use tactus_core::rig::arm::{ArmOrder, ArmReport};
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::sensor::FingerCode;
 use tactus_core::wire::{Command, Event, Failure};
-use tactus_link::printer::{Axis, Carrier, Dialect, Printer, Setup as Measured};
+use tactus_link::printer::{Axis, Carrier, Dialect, Printer, PrinterError, Setup as Measured};
 use tactus_world::noise::Noise;
 use tactus_world::printer::{Kind, Printer as Machine};
 use tactus_world::world::{Setup, World};
@@ -160,8 +160,15 @@ pub enum PrinterLearnError {
     #[error(transparent)]
     Learn(#[from] LearnError),
     /// A slide did not come.
-    #[error("the printer's slides did not come: {0}")]
-    Slides(#[from] Box<Failure>),
+    #[error("slides of texture {texture} did not come: {why} ({printer:?})")]
+    Slides {
+        /// Number of the texture.
+        texture: u8,
+        /// The probe's reason.
+        why: Box<Failure>,
+        /// The printer's.
+        printer: Option<PrinterError>,
+    },
 }
 
 #[derive(Default)]
@@ -207,19 +214,17 @@ pub fn learn_on(collection: &Collection, kind: Kind) -> Result<Vec<u8>, PrinterL
         .textures
         .par_iter()
         .map(|&texture| {
-            let slides = record(
-                collection.setup(texture, 0),
-                kind,
-                collection.trials,
-                &table,
-            )?;
+            // the sample is moved before each, as whoever records is asked to
+            let trials = 0..u64::from(collection.trials);
+            let slides = trials.map(|trial| record(collection.setup(texture, trial), kind, &table));
+            let slides = slides.collect::<Result<Vec<_>, _>>()?.concat();
             let of = |movement: &Movement| {
                 let of = slides.iter().filter(|(made, _)| made == movement);
                 of.map(|(_, trial)| trial.clone()).collect()
             };
             Ok(movements.iter().map(of).collect())
         })
-        .collect::<Result<_, Box<Failure>>>()?;
+        .collect::<Result<_, PrinterLearnError>>()?;
     let names = collection.names();
     let table = learn::learn_lengths(&Expected::default(), bands, &names, movements, &[], &trials);
     let table = table.map_err(LearnError::from)?;
@@ -232,20 +237,27 @@ pub fn learn_on(collection: &Collection, kind: Kind) -> Result<Vec<u8>, PrinterL
 fn record(
     setup: Setup,
     kind: Kind,
-    trials: u32,
     table: &[u8],
-) -> Result<Vec<(Movement, ObservedTrial)>, Box<Failure>> {
+) -> Result<Vec<(Movement, ObservedTrial)>, PrinterLearnError> {
     let (plan, host) = (Plan::new(), RefCell::new(Slides::default()));
     let mut buffer = vec![0; TABLE];
     let end = PrinterEnd::new(setup.trial_seed, measured(kind));
     let rig = rig(setup, kind, Unguarded::default(), end);
     let probe = switch_on(rig, RamFlash::blank(), table, &mut buffer, &plan, &host);
+    let failed = |why: Failure, printer| PrinterLearnError::Slides {
+        texture: setup.texture,
+        why: Box::new(why),
+        printer,
+    };
     // its store is in RAM and new
     let mut probe: SimProbe<'_, Slides, ArmRig<PrinterEnd>> =
-        probe.map_err(|why| Box::new(Failure::Memory(why.into())))?;
-    let slides = (trials as usize * Collection::MOVEMENTS.len()).min(100) as u8;
+        probe.map_err(|why| failed(Failure::Memory(why.into()), None))?;
+    let slides = Collection::MOVEMENTS.len() as u8;
     let wanted = Recorder::wanted(0, slides, setup.trial_seed as u32);
-    block_on(probe.perform(&Command::Identify(wanted))).map_err(Box::new)?;
+    if let Err(why) = block_on(probe.perform(&Command::Identify(wanted))) {
+        let program = probe.rig.servo.rig().program();
+        return Err(failed(why, program.printer.take_failure()));
+    }
     drop(probe);
     Ok(host.into_inner().0)
 }

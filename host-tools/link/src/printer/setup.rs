@@ -233,8 +233,8 @@ async fn lies(
     printer.greet().await.map_err(failed)?;
     consents(
         probe,
-        "2. With the printer's own screen (Move axis), bring the finger over one end of the sample, 5 mm inside, so that \
-         it hangs 2 to 4 mm above it.",
+        "2. With the printer's own screen (Move axis), bring the finger over one end of the sample, 5 mm inside, so \
+         that it hangs 2 to 4 mm above it.",
         "Is it there, and is the way over the sample free",
     )
     .await?;
@@ -306,8 +306,8 @@ pub async fn set_up(
     consents(
         probe,
         &format!(
-            "5. It has slid to and fro in the air over {along:.0} mm: {:.0} mm/s^2, {:.0} to {:.0} ms from a line to its \
-             motion.",
+            "5. It has slid to and fro in the air over {along:.0} mm: {:.0} mm/s^2, {:.0} to {:.0} ms from a line to \
+             its motion.",
             setup.acceleration_mm_s2,
             setup.start_s[0] * 1e3,
             setup.start_s[1] * 1e3

@@ -17,8 +17,8 @@ const LINES: usize = 4;
 const BUSY_S: f64 = 2.0;
 /// Time that a first move waits for others behind it, ms (Marlin: BLOCK_DELAY_FOR_1ST_MOVE).
 const FIRST_MOVE_MS: f64 = 100.0;
-/// Time that a Klipper waits before a first move, ms: PRIMING_CMD_TIME and BUFFER_TIME_START, and some for its processes
-/// (chosen). With `M400` behind it the former is left out.
+/// Time that a Klipper waits before a first move, ms: PRIMING_CMD_TIME and BUFFER_TIME_START, and some for its
+/// processes (chosen). With `M400` behind it the former is left out.
 const KLIPPER_MS: (f64, f64) = (350.0, 370.0);
 /// It looks so often whether all is done, s.
 const KLIPPER_LOOKS_S: f64 = 0.1;

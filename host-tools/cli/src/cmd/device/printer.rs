@@ -27,7 +27,7 @@ pub(crate) enum Command {
     Show(Show),
 }
 
-/// Measure a printer with a person beside it: where the sample lies, how deep the finger may go, how the machine answers
+/// Measure a printer with a person beside it: where the sample lies, how deep the finger may go, how it answers
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,8 +35,8 @@ Examples:
   tactus device printer setup --printer ~/printer_data/comms/klippy.serial     Klipper
   tactus device printer setup --printer COM5 --baud 250000
 
-Each step says what it does next, and waits for a line: y or n. Nothing moves before you have said that the way is free; the first approach
-is at 0.5 mm/s. Ctrl-C lifts the finger; nothing is kept then, and the command begins again.")]
+Each step says what it does next, and waits for a line: y or n. Nothing moves before you have said that the way is free;
+the first approach is at 0.5 mm/s. Ctrl-C lifts the finger; nothing is kept then, and the command begins again.")]
 pub(crate) struct SetUp {
     #[command(flatten)]
     at: Where,
