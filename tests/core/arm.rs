@@ -11,48 +11,20 @@ use tactus_core::explorer::Method;
 use tactus_core::features::FeatureSet;
 use tactus_core::rig::guard::Unguarded;
 use tactus_core::rig::{Fault, RigError};
-use tactus_core::wire::{Command, Event, Failure, Identify, Rejection, Verdict};
+use tactus_core::wire::{Command, Failure, Identify, Rejection};
 use tactus_lab::sim::collection::{Collection, texture_name, texture_number};
 use tactus_lab::sim::flash::{RamFlash, TABLE};
 use tactus_lab::sim::over_link::ArmRig;
-use tactus_lab::sim::probe::{Host, SimProbe, switch_on};
+use tactus_lab::sim::probe::{SimProbe, switch_on};
 use tactus_lab::sim::rig::FORCE_LIMIT_N;
 use tactus_tests::count;
 use tactus_world::arm_program::Misbehaves;
 use tactus_world::world::Setup;
 
-use crate::rigs::{assert_all, texture};
+use crate::rigs::{Heard, assert_all, texture};
 
 /// Stop, lift, and the time until nobody waits any more.
 const RESTS_MS: u32 = 8000;
-
-/// The probe's words.
-#[derive(Default, Debug)]
-struct Heard {
-    verdict: Option<Verdict>,
-    slides: u32,
-    rejected: Vec<Failure>,
-    faults: Vec<Fault>,
-}
-
-impl Host for Heard {
-    fn tell(&mut self, event: Event) {
-        match event {
-            Event::Verdict(verdict) => self.verdict = Some(verdict),
-            Event::SlideReport { .. } => self.slides += 1,
-            Event::Rejected { why, .. } => self.rejected.push(why),
-            _ => {}
-        }
-    }
-
-    fn tick(&mut self, _now: std::time::Duration, rig: &tactus_core::probe::RigState) {
-        if let tactus_core::rig::Phase::Faulted(fault) = rig.phase
-            && self.faults.last() != Some(&fault)
-        {
-            self.faults.push(fault);
-        }
-    }
-}
 
 /// The end of an exploration.
 #[derive(Debug)]

@@ -2,21 +2,20 @@
 //! Explorations are right, forces are by the world, and whatever breaks, the finger never feels more than 2.2 N.
 
 use std::cell::RefCell;
-use std::time::Duration;
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
 use tactus_core::dsp::Plan;
+use tactus_core::rig::Fault;
 use tactus_core::rig::arm::{ArmOrder, ArmReport, ArmState, ArmTask};
 use tactus_core::rig::guard::Unguarded;
-use tactus_core::rig::{Fault, Phase};
 use tactus_core::sensor::FingerName;
-use tactus_core::wire::{Command, Event, Failure, Identify, Verdict};
+use tactus_core::wire::{Command, Failure, Identify};
 use tactus_lab::sim::collection::{Collection, texture_name};
 use tactus_lab::sim::flash::{RamFlash, TABLE};
 use tactus_lab::sim::over_link::{ArmRig, Mover};
 use tactus_lab::sim::printer::{PrinterEnd, learn_on, measured, rig};
-use tactus_lab::sim::probe::{Host, SimProbe, switch_on};
+use tactus_lab::sim::probe::{SimProbe, switch_on};
 use tactus_lab::sim::rig::FORCE_LIMIT_N;
 use tactus_link::printer::PrinterError;
 use tactus_tests::count;
@@ -24,7 +23,7 @@ use tactus_world::noise::Noise;
 use tactus_world::printer::{Kind, PrinterFault};
 use tactus_world::world::{Setup, World};
 
-use crate::rigs::{assert_all, texture};
+use crate::rigs::{Heard, assert_all, texture};
 
 const OLD: Kind = Kind::Marlin {
     emergency_parser: false,
@@ -146,36 +145,6 @@ impl Mover for Breaking {
 
     fn permit(&mut self, world: &mut World, permitted: bool) {
         self.end.permit(world, permitted);
-    }
-}
-
-/// What the probe said.
-#[derive(Default, Debug)]
-struct Heard {
-    verdict: Option<Verdict>,
-    slides: u32,
-    rejected: Vec<Failure>,
-    faults: Vec<Fault>,
-    seconds: f64,
-}
-
-impl Host for Heard {
-    fn tell(&mut self, event: Event) {
-        match event {
-            Event::Verdict(verdict) => self.verdict = Some(verdict),
-            Event::SlideReport { .. } => self.slides += 1,
-            Event::Rejected { why, .. } => self.rejected.push(why),
-            _ => {}
-        }
-    }
-
-    fn tick(&mut self, now: Duration, rig: &tactus_core::probe::RigState) {
-        self.seconds = now.as_secs_f64();
-        if let Phase::Faulted(fault) = rig.phase
-            && self.faults.last() != Some(&fault)
-        {
-            self.faults.push(fault);
-        }
     }
 }
 

@@ -1,11 +1,15 @@
 //! Simulated rigs for tests: homed, sliding, and watched.
 
 use std::fmt::Display;
+use std::time::Duration;
 
 use rayon::prelude::*;
 use tactus_core::features::Movement;
-use tactus_core::rig::Phase;
+use tactus_core::probe::RigState;
 use tactus_core::rig::guard::Unguarded;
+use tactus_core::rig::{Fault, Phase};
+use tactus_core::wire::{Event, Failure, Verdict};
+use tactus_lab::sim::probe::Host;
 use tactus_lab::sim::rig::SimRig;
 use tactus_world::world::Setup;
 
@@ -82,4 +86,35 @@ pub(crate) fn assert_all<C: Sync + Send, E: Display + Send>(
         .collect();
     let (wrong, all) = (objections.len(), cases.len());
     assert_eq!(wrong, 0, "of {all}:\n{}", objections.join("\n"));
+}
+
+/// Words of a probe whose finger somebody else moves.
+#[derive(Default, Debug)]
+pub(crate) struct Heard {
+    pub(crate) verdict: Option<Verdict>,
+    pub(crate) slides: u32,
+    pub(crate) rejected: Vec<Failure>,
+    pub(crate) faults: Vec<Fault>,
+    /// Virtual time so far, s.
+    pub(crate) seconds: f64,
+}
+
+impl Host for Heard {
+    fn tell(&mut self, event: Event) {
+        match event {
+            Event::Verdict(verdict) => self.verdict = Some(verdict),
+            Event::SlideReport { .. } => self.slides += 1,
+            Event::Rejected { why, .. } => self.rejected.push(why),
+            _ => {}
+        }
+    }
+
+    fn tick(&mut self, now: Duration, rig: &RigState) {
+        self.seconds = now.as_secs_f64();
+        if let Phase::Faulted(fault) = rig.phase
+            && self.faults.last() != Some(&fault)
+        {
+            self.faults.push(fault);
+        }
+    }
 }

@@ -2,8 +2,8 @@
 //! ([`ArmOrder`]), spoken in G-code. Without I/O of its own: [`Carrier::carry`] takes the printer's bytes and the time,
 //! and returns bytes for it; [`Printer`] takes orders and force, and has the reports.
 //!
-//! The printer is never sent more than a step of the way down, or a tenth of a second of a slide: whatever breaks, no
-//! more than that goes on. It is not told to heat, to feed filament, or to find the bed.
+//! The printer is never sent more than a step of the way down, or a fifth of a second of a slide (a Klipper, a second):
+//! whatever breaks, no more than that goes on. It is not told to heat, to feed filament, or to find the bed.
 
 mod gcode;
 mod moves;
@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
-use tactus_core::rig::arm::{ARM_SAYS_MS, ArmMovement, ArmOrder, ArmReport, ArmState, ArmTask};
+use tactus_core::rig::arm::{ARM_SAYS_MS, ArmOrder, ArmReport, ArmState, ArmTask};
 
 use super::probe::turn;
 use gcode::Dialogue;
@@ -110,9 +110,9 @@ pub struct Press {
     pub stiffness_n_mm: f64,
     /// Way of the axis before the force falls, mm; 0 where it was not measured.
     pub backlash_mm: f64,
-    /// Height at which the sample was touched at the slide's begin, mm, and its rise to the end for each mm.
+    /// Height of a touch at 0 along the sample, mm.
     pub touched_mm: f64,
-    /// Rise for each mm.
+    /// Rise of the sample for each mm along it.
     pub slope: f64,
 }
 
@@ -137,7 +137,7 @@ struct State {
     lost: bool,
     down: bool,
     parked: bool,
-    movement: Option<(ArmMovement, moves::Path)>,
+    path: Option<moves::Path>,
     press: Option<Press>,
     presses: Vec<Press>,
     measures_backlash: bool,
@@ -147,6 +147,13 @@ struct State {
     measures_motion: bool,
     motion: Option<Result<Motion>>,
     failure: Option<PrinterError>,
+}
+
+impl State {
+    /// Has the progress of an order said at once.
+    fn reach(&mut self, number: u16, state: ArmState) {
+        (self.report, self.said) = (Some(ArmReport { number, state }), Duration::ZERO);
+    }
 }
 
 /// A printer; its copies are the same one.
@@ -185,11 +192,7 @@ impl Printer {
         let mut state = self.state();
         if state.order != Some(order) {
             state.order = Some(order);
-            state.report = Some(ArmReport {
-                number: order.number,
-                state: ArmState::Busy,
-            });
-            state.said = Duration::ZERO;
+            state.reach(order.number, ArmState::Busy);
         }
     }
 
@@ -237,8 +240,7 @@ impl Printer {
     fn reach(&self, number: u16, state: ArmState) {
         let mut here = self.state();
         if here.order.is_some_and(|order| order.number == number) {
-            here.report = Some(ArmReport { number, state });
-            here.said = Duration::ZERO;
+            here.reach(number, state);
         }
     }
 }

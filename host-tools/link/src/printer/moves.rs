@@ -34,6 +34,8 @@ const SETTLES: Duration = Duration::from_millis(60);
 const STARTS: Duration = Duration::from_secs(5);
 /// The time of a slide may be off by this share and s.
 const TIME_OFF: (f64, f64) = (0.02, 0.04);
+/// A printer that stands farther from where it was parked has another zero, or was moved, mm.
+const MOVED_MM: f64 = 0.5;
 /// A place that it says may be off by its rounding, mm.
 pub(super) const PLACE_OFF_MM: f64 = 0.02;
 
@@ -138,7 +140,7 @@ impl Printer {
     }
 
     /// Waits until the printer has done all, which takes so many s, and says where it is.
-    async fn done(&self, seconds: f64) -> Result<[f64; 3]> {
+    pub(super) async fn done(&self, seconds: f64) -> Result<[f64; 3]> {
         self.line("M400", seconds + ANSWERS.as_secs_f64()).await?;
         // an answer, or the line itself, may have been lost
         for _ in 0..2 {
@@ -180,6 +182,9 @@ impl Printer {
             let mut state = self.state();
             let parked = state.setup.as_mut().and_then(|setup| setup.parked.take());
             state.greeted = true;
+            if let Some(setup) = &mut state.setup {
+                setup.dialect = dialect;
+            }
             (state.setup.clone(), parked)
         };
         let marlin = matches!(dialect, Dialect::Marlin { .. });
@@ -204,6 +209,10 @@ impl Printer {
                         .await?;
                     let mut state = self.state();
                     (state.at, state.parked) = ([along, z], true);
+                }
+                // in another frame than then: it was homed, or moved by hand
+                Some(parked) if (parked[0] - here[0]).hypot(parked[1] - here[1]) > MOVED_MM => {
+                    return Err(LineError::Reset.into());
                 }
                 Some(_) => self.state().parked = true,
                 None if reset => return Err(PrinterError::NotSetUp),
@@ -338,19 +347,17 @@ impl Printer {
 
     /// Makes the slide of the last press.
     pub(super) async fn slide(&self, number: u16) -> Result<ArmState> {
-        let Some((_, path)) = self.state().movement else {
+        let Some(path) = self.state().path else {
             return Err(PrinterError::NotSetUp);
         };
         let setup = self.set_up()?;
         let slope = self.state().press.map_or(0.0, |press| press.slope);
-        // the probe looks for less by a mean, since P_DC rings with a texture
-        let too_hard = HARDEST_N;
         let to_z = self.state().at[1] + slope * (path.to_mm - path.from_mm);
         let took = self
             .glide(
                 [path.to_mm, to_z],
                 path.speed,
-                Some((number, path.steady_s, too_hard)),
+                Some((number, path.steady_s)),
             )
             .await?;
         let wanted = setup.seconds(path.to_mm - path.from_mm, path.speed);
@@ -375,7 +382,7 @@ impl Printer {
         &self,
         to: [f64; 2],
         speed: f64,
-        reports: Option<(u16, f64, f64)>,
+        reports: Option<(u16, f64)>,
     ) -> Result<f64> {
         let (axis, letter) = self.along();
         let (from, dialect) = {
@@ -396,18 +403,14 @@ impl Printer {
                 return Err(PrinterError::Replaced);
             }
             let since = state.now.saturating_sub(begun).as_secs_f64();
-            if let Some((number, steady_s, too_hard)) = reports {
-                if state.felt()? > too_hard {
-                    return Err(PrinterError::Unsteady(too_hard));
+            if let Some((number, steady_s)) = reports {
+                // the probe looks for less by a mean, since P_DC rings with a texture
+                if state.felt()? > HARDEST_N {
+                    return Err(PrinterError::Unsteady(HARDEST_N));
                 }
                 if since >= steady_s && !steady {
                     steady = true;
-                    let state_of = ArmState::Steady;
-                    state.report = Some(super::ArmReport {
-                        number,
-                        state: state_of,
-                    });
-                    state.said = Duration::ZERO;
+                    state.reach(number, ArmState::Steady);
                 }
             }
             Ok(since)
@@ -468,7 +471,7 @@ impl Printer {
         if self.state().lost {
             return self.rescue().await;
         }
-        // what is on its way is a step down, or a tenth of a second of a slide
+        // what is on its way is a step down, or a fifth of a second of a slide
         let place = match self.done(1.0).await {
             Err(PrinterError::Line(LineError::Silent)) => {
                 {

@@ -13,6 +13,8 @@ const STEP_MM: f64 = 0.2;
 const CLEAR_MM: f64 = 0.5;
 /// An axis arrives from one side of its play: it goes back by so much before, upwards and downwards, mm.
 const BACK_MM: [f64; 2] = [0.25, 0.12];
+/// A sample rises by this share of its length at most.
+const RISES_MOST: f64 = 0.01;
 /// A sample that rises by more along a slide is followed upwards, mm.
 const RISES_MM: f64 = 0.005;
 /// A way that is shorter may not be made at all (Marlin: MIN_STEPS_PER_SEGMENT of 6), mm.
@@ -29,8 +31,8 @@ const TRIES: usize = 16;
 const RELAXES: Duration = Duration::from_millis(400);
 
 impl Printer {
-    /// Goes down by steps at `along` until the finger feels something; the height and the force there.
-    async fn come_down(&self, along: f64, mm_s: f64, newton: f64) -> Result<[f64; 2]> {
+    /// Goes down by steps at `along` until the finger feels something.
+    async fn come_down(&self, along: f64, mm_s: f64, newton: f64) -> Result<()> {
         let floor = self.set_up()?.floor_mm;
         loop {
             let z = self.state().at[1] - STEP_MM;
@@ -45,7 +47,7 @@ impl Printer {
                 return Err(PrinterError::Unsteady(newton));
             }
             if force >= TOUCH_N {
-                return Ok([z, force]);
+                return Ok(());
             }
         }
     }
@@ -115,7 +117,7 @@ impl Printer {
         let path = setup.path(&movement)?;
         let newton = f64::from(movement.force_mn) * 1e-3;
         let mm_s = f64::from(movement.approach_um_s.min(setup.approach_um_s())) * 1e-3;
-        self.state().movement = Some((movement, path));
+        self.state().path = Some(path);
         self.rise(setup.lifted_mm).await?;
         let light = LIGHT_N.min(0.6 * newton);
         let known = self.state().press;
@@ -128,7 +130,7 @@ impl Printer {
             .touch(path.to_mm, near(path.to_mm).unwrap_or(high), light, mm_s)
             .await?;
         self.rise(high).await?;
-        let expected = far + CLEAR_MM + setup.rises_mm(path.to_mm - path.from_mm);
+        let expected = far + CLEAR_MM + RISES_MOST * (path.to_mm - path.from_mm).abs();
         let [close, _] = self
             .touch(path.from_mm, expected.min(high), light, mm_s)
             .await?;

@@ -154,11 +154,6 @@ impl Setup {
         }
     }
 
-    /// A sample rises by so much at most over this length, mm.
-    pub(super) fn rises_mm(&self, length_mm: f64) -> f64 {
-        0.01 * length_mm.abs()
-    }
-
     /// Time of a way from rest to rest at this speed, s.
     pub(super) fn seconds(&self, length_mm: f64, mm_s: f64) -> f64 {
         length_mm.abs() / mm_s + mm_s / self.acceleration_mm_s2
@@ -225,7 +220,7 @@ async fn lies(
             emergency_parser: true,
         } => "Marlin with its emergency parser: it can be stopped at once",
         Dialect::Marlin { .. } => {
-            "Marlin without emergency parser: it stops within a tenth of a second"
+            "Marlin without emergency parser: it stops within a fifth of a second"
         }
         Dialect::Klipper => "Klipper: home it by its own screen first; it stops within a second",
     };
@@ -238,14 +233,14 @@ async fn lies(
         "Is it there, and is the way over the sample free",
     )
     .await?;
-    let begin = printer.place().await.map_err(failed)?;
+    let begin = printer.done(10.0).await.map_err(failed)?;
     consents(
         probe,
         "3. Now bring it over the other end in the same way, at the same height; only X or only Y.",
         "Is it there",
     )
     .await?;
-    let end = printer.place().await.map_err(failed)?;
+    let end = printer.done(10.0).await.map_err(failed)?;
     let ways = [end[0] - begin[0], end[1] - begin[1]];
     let axis = match ways[0].abs() >= ways[1].abs() {
         true => Axis::X,
@@ -403,16 +398,6 @@ impl Printer {
         let mut state = self.state();
         state.measures_backlash = setup.stiffness_n_mm.is_none();
         (state.setup, state.at) = (Some(setup), at);
-    }
-
-    /// Where it is.
-    async fn place(&self) -> Result<[f64; 3], PrinterError> {
-        self.line("M400", 10.0).await?;
-        self.line("M114", 2.0).await?;
-        self.state()
-            .talk
-            .place()
-            .ok_or_else(|| super::LineError::Silent.into())
     }
 
     async fn move_up(&self) -> Result<(), PrinterError> {
