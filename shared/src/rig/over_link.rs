@@ -34,7 +34,7 @@ const LIFTED_MN: f32 = 92.0;
 const TOO_HARD: (f32, f32) = (1.2, 150.0);
 /// Time over which that is taken while the finger slides, ms: a load cell rings with the texture, which P_DC, sampled
 /// slowly, shows as some 0.2 N (simulated `mems` at 63 mm/s).
-const RINGS_MS: f32 = 40.0;
+const RINGS_MS: f32 = 100.0;
 /// Force that is a fault while the finger is lifted or on its way, mN.
 const IN_AIR_MN: f32 = 500.0;
 /// The pressed finger's force may be off the movement's by a share of it, and counts of P_DC.
@@ -57,9 +57,9 @@ const RELEASE_MS: u32 = 500;
 /// Time from a stop until the force must be under the limit, and as long again until the finger must be lifted, ms: an
 /// arm is assumed to stand after 100 ms, and has as long to go up.
 const STOPS_MS: u32 = 200;
-const FREE_MS: u32 = 2000;
+const FREE_MS: u32 = 4000;
 /// Time after which the probe gives up on an arm that does not lift the finger, ms.
-const GAVE_UP_MS: u32 = 5000;
+const GAVE_UP_MS: u32 = 7000;
 
 /// A rig that an arm moves.
 #[derive(Clone, Debug)]
@@ -321,7 +321,9 @@ impl RigOverLink {
         }
         let force_mn = self.force_mn();
         self.slid_mn = match self.phase {
-            Phase::Sliding => self.slid_mn + (force_mn - self.slid_mn) / RINGS_MS,
+            Phase::Sliding | Phase::Faulted(_) => {
+                self.slid_mn + (force_mn - self.slid_mn) / RINGS_MS
+            }
             _ => force_mn,
         };
         let mut outputs = Outputs::default();
@@ -354,7 +356,8 @@ impl RigOverLink {
             }
             // the arm's task before is unknown
             Phase::Homing => most_mn,
-            Phase::Sliding => most_mn,
+            // see `slid_mn`
+            Phase::Sliding | Phase::Faulted(_) => most_mn,
             _ => self.too_hard_mn(),
         };
         limit_mn.min(most_mn)
@@ -385,7 +388,7 @@ impl RigOverLink {
         let fault = self
             .guard
             .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn);
-        let slides_hard = self.phase == Phase::Sliding
+        let slides_hard = matches!(self.phase, Phase::Sliding | Phase::Faulted(_))
             && self.slid_mn > self.too_hard_mn()
             && self.guard.looks_for(Fault::ForceHigh);
         let fault = fault.or(slides_hard.then_some(Fault::ForceHigh))?;

@@ -193,8 +193,8 @@ fn too_much_force_demands_a_stop_in_the_same_millisecond() {
     bench.counts = 900.0 / bench.rig.calibration.pressure.force_mn_per_count;
     let (fault, ms) = faulted(&mut bench, since);
     assert_eq!(fault, Fault::ForceHigh);
-    // a mean of 10 ms, and another of 40 while the finger slides
-    assert!((20..=60).contains(&ms), "{ms}");
+    // a mean of 10 ms, and another of 100 while the finger slides
+    assert!((20..=120).contains(&ms), "{ms}");
     // 2.1 N: at once
     let mut hard = Bench::sliding(movement);
     hard.says(ArmState::Steady, 300);
