@@ -41,7 +41,8 @@ pub(crate) struct SetUp {
     #[command(flatten)]
     at: Where,
     /// Its baud rate
-    #[arg(long, value_name = "N", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(9600..=2_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 115_200)]
+    #[arg(value_parser = clap::value_parser!(u32).range(9600..=2_000_000))]
     baud: u32,
 }
 
