@@ -250,9 +250,9 @@ impl Printer {
         self.mount.tick(force_n);
         let x_mm = self.carriage_mm[0] - self.begins_mm;
         // belt and bed smooth the microsteps
-        let speed = (x_mm - self.x_mm) / TICK_S;
-        self.speed_mm_s += 0.01 * (speed - self.speed_mm_s);
-        self.x_mm += (x_mm - self.x_mm) * 0.05;
+        let moved_mm = (x_mm - self.x_mm) * 0.05;
+        self.x_mm += moved_mm;
+        self.speed_mm_s += 0.01 * (moved_mm / TICK_S - self.speed_mm_s);
         self.shake();
     }
 

@@ -32,9 +32,6 @@ const LIFTED_MN: f32 = 92.0;
 /// Excess over a movement's force that is a fault: a share of it, and mN. With 1.26 N that is 1.66 N: an arm that comes
 /// down at three times its speed limit stays below 2.2 N then, see `tests/core/arm.rs`.
 const TOO_HARD: (f32, f32) = (1.2, 150.0);
-/// Time over which that is taken while the finger slides, ms: a load cell rings with the texture, which P_DC, sampled
-/// slowly, shows as some 0.2 N (simulated `mems` at 63 mm/s).
-const RINGS_MS: f32 = 100.0;
 /// Force that is a fault while the finger is lifted or on its way, mN.
 const IN_AIR_MN: f32 = 500.0;
 /// The pressed finger's force may be off the movement's by a share of it, and counts of P_DC.
@@ -57,9 +54,9 @@ const RELEASE_MS: u32 = 500;
 /// Time from a stop until the force must be under the limit, and as long again until the finger must be lifted, ms: an
 /// arm is assumed to stand after 100 ms, and has as long to go up.
 const STOPS_MS: u32 = 200;
-const FREE_MS: u32 = 4000;
+const FREE_MS: u32 = 2000;
 /// Time after which the probe gives up on an arm that does not lift the finger, ms.
-const GAVE_UP_MS: u32 = 7000;
+const GAVE_UP_MS: u32 = 5000;
 
 /// A rig that an arm moves.
 #[derive(Clone, Debug)]
@@ -85,8 +82,6 @@ pub struct RigOverLink {
     air: Option<f32>,
     still: f32,
     expected_mn: f32,
-    /// Force of the slide, mean over some time, mN.
-    slid_mn: f32,
 }
 
 impl RigOverLink {
@@ -117,7 +112,6 @@ impl RigOverLink {
             air: None,
             still: 0.0,
             expected_mn: 0.0,
-            slid_mn: 0.0,
         }
     }
 
@@ -319,13 +313,6 @@ impl RigOverLink {
         for word in pdc.filter(|word| word.channel == Channel::Pdc) {
             self.meter.push(word.counts);
         }
-        let force_mn = self.force_mn();
-        self.slid_mn = match self.phase {
-            Phase::Sliding | Phase::Faulted(_) => {
-                self.slid_mn + (force_mn - self.slid_mn) / RINGS_MS
-            }
-            _ => force_mn,
-        };
         let mut outputs = Outputs::default();
         match self.watch(inputs) {
             Some(fault) => self.fail(fault),
@@ -356,16 +343,12 @@ impl RigOverLink {
             }
             // the arm's task before is unknown
             Phase::Homing => most_mn,
-            // see `slid_mn`
-            Phase::Sliding | Phase::Faulted(_) => most_mn,
-            _ => self.too_hard_mn(),
+            _ => {
+                let (share, mn) = TOO_HARD;
+                f32::from(self.movement.force_mn()) * share + mn
+            }
         };
         limit_mn.min(most_mn)
-    }
-
-    fn too_hard_mn(&self) -> f32 {
-        let (share, mn) = TOO_HARD;
-        f32::from(self.movement.force_mn()) * share + mn
     }
 
     /// The guard's fault, from sensor and force; all else belongs to the arm.
@@ -387,11 +370,7 @@ impl RigOverLink {
         );
         let fault = self
             .guard
-            .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn);
-        let slides_hard = matches!(self.phase, Phase::Sliding | Phase::Faulted(_))
-            && self.slid_mn > self.too_hard_mn()
-            && self.guard.looks_for(Fault::ForceHigh);
-        let fault = fault.or(slides_hard.then_some(Fault::ForceHigh))?;
+            .tick(&seen, &self.meter, self.finger, mn_per_count, limit_mn)?;
         match (self.phase, fault) {
             // before P_DC in the air is known, its height is meaningless
             (_, Fault::ForceHigh) if !self.knows_air() => None,

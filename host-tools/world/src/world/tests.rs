@@ -247,6 +247,31 @@ fn the_stage_slides_and_its_pins_say_where() {
     assert_eq!(bench.world.truth().stage_mm, 0.0);
 }
 
+/// Textures vibrate by the speed: it is the way that a printer's carriage makes in a time.
+#[test]
+fn a_printer_tells_the_speed_of_its_way() {
+    use crate::printer::{Kind, Printer};
+    for mm in [12.0, -12.0] {
+        let mut bench = Bench::new(setup(1, 5));
+        bench
+            .world
+            .mount_on_printer(Printer::new(1, 5, Kind::Klipper));
+        bench.world.printer().unwrap().jog([mm, 0.0, 0.0]);
+        bench.wait_ms(150);
+        let began_mm = bench.world.truth().sample_mm;
+        let mut speed = 0.0;
+        for _ in 0..100 {
+            bench.wait_ms(1);
+            speed += bench.world.truth().speed_mm_s / 100.0;
+        }
+        let made = (bench.world.truth().sample_mm - began_mm) / 0.1;
+        assert!(
+            made.abs() > 20.0 && (speed / made - 1.0).abs() < 0.05,
+            "{speed} {made}"
+        );
+    }
+}
+
 /// At 1 kHz the count has to tell a constant speed, though ticks are not a whole part of a millisecond.
 #[test]
 fn the_count_is_smooth_between_ticks() {

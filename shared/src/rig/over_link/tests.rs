@@ -193,15 +193,8 @@ fn too_much_force_demands_a_stop_in_the_same_millisecond() {
     bench.counts = 900.0 / bench.rig.calibration.pressure.force_mn_per_count;
     let (fault, ms) = faulted(&mut bench, since);
     assert_eq!(fault, Fault::ForceHigh);
-    // a mean of 10 ms, and another of 100 while the finger slides
-    assert!((20..=120).contains(&ms), "{ms}");
-    // 2.1 N: at once
-    let mut hard = Bench::sliding(movement);
-    hard.says(ArmState::Steady, 300);
-    let since = hard.ms;
-    hard.counts = 2100.0 / hard.rig.calibration.pressure.force_mn_per_count;
-    let (fault, ms) = faulted(&mut hard, since);
-    assert!(fault == Fault::ForceHigh && ms <= 12, "{fault:?} {ms}");
+    // a mean of 10 ms
+    assert!(ms <= 12, "{ms}");
     assert!(bench.outputs.lever_enabled);
     assert_eq!(bench.rig.reset(), Err(Refused::Busy));
     // it obeys
