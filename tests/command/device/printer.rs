@@ -164,15 +164,21 @@ fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
         code == Some(1) && !said.contains("It slides along"),
         "{said}"
     );
-    assert!(!at.path("mine.json").exists());
-    let (code, said) = setup("y\ny\ny\ny\n");
+    assert!(!at.path("mine.json").exists() && !at.path("mine.json.part").exists());
+    // the finger did not go up: it is mended, and the set-up goes on with the sample's place
+    let (code, said) = setup("y\ny\nn\n");
+    assert!(
+        code == Some(1) && said.contains("It slides along X over 74 mm"),
+        "{said}"
+    );
+    let (code, said) = setup("y\ny\ny\n");
     println!("{said}");
     assert_eq!(code, Some(0), "{said}");
     assert_says(
         &said,
         &[
             "Marlin with its emergency parser",
-            "It slides along X over 74 mm",
+            "was left after step 3: the sample lies along X from 0.0 to 74.0 mm",
             "It has moved 5 mm",
             "Stiffness",
             "Kept in",

@@ -102,9 +102,9 @@ impl OpenPrinter {
         })
     }
 
-    /// A printer that is not set up yet.
-    pub fn bare(port: &str, baud: u32) -> Result<Self, OpenError> {
-        let (printer, carrier) = Printer::new(None);
+    /// A printer that is to be set up, with what a set-up before has left of it.
+    pub fn bare(port: &str, baud: u32, left: Option<Setup>) -> Result<Self, OpenError> {
+        let (printer, carrier) = Printer::new(left);
         Ok(Self {
             printer,
             file: None,

@@ -197,7 +197,7 @@ async fn consents(probe: &Probe, said: &str, asked: &str) -> Result<(), Operatio
     match probe.ask(question).await? {
         true => Ok(()),
         false => Err(OperationError::said(
-            "stopped: nothing of the set-up was kept; run it again when it is mended",
+            "stopped: run the same command again when it is mended",
         )),
     }
 }
@@ -206,14 +206,8 @@ fn failed(why: PrinterError) -> OperationError {
     OperationError::said(why)
 }
 
-/// What the printer is, and where the sample lies on it: the first three steps of its set-up.
-async fn lies(
-    probe: &Probe,
-    printer: &Printer,
-    port: &str,
-    baud: u32,
-) -> Result<Setup, OperationError> {
-    let mut words = probe.words();
+/// What the printer is: the first step of its set-up.
+async fn greet(probe: &Probe, printer: &Printer, port: &str) -> Result<Dialect, OperationError> {
     let dialect = printer.identify().await.map_err(failed)?;
     let named = match dialect {
         Dialect::Marlin {
@@ -224,8 +218,40 @@ async fn lies(
         }
         Dialect::Klipper => "Klipper: home it by its own screen first; it stops within a second",
     };
-    writeln!(words, "1. The printer at {port} is {named}.")?;
+    writeln!(probe.words(), "1. The printer at {port} is {named}.")?;
     printer.greet().await.map_err(failed)?;
+    Ok(dialect)
+}
+
+/// The set-up that a run before has left, where nothing has moved since.
+async fn left(probe: &Probe, printer: &Printer) -> Result<Option<Setup>, OperationError> {
+    let Some(setup) = printer.setup() else {
+        return Ok(None);
+    };
+    let [begin, end] = setup.sample_mm;
+    let stands = Question {
+        said: format!(
+            "   The set-up was left after step 3: the sample lies along {} from {begin:.1} to {end:.1} mm.",
+            setup.axis.letter()
+        ),
+        asked: "Do printer, finger and sample stand as they did, and is the way free".to_owned(),
+        kind: QuestionKind::Consent,
+    };
+    let stands = probe.ask(stands).await?;
+    if !stands {
+        printer.state().setup = None;
+    }
+    Ok(stands.then_some(setup))
+}
+
+/// Where the sample lies on the printer: steps 2 and 3 of its set-up.
+async fn lies(
+    probe: &Probe,
+    printer: &Printer,
+    dialect: Dialect,
+    port: &str,
+    baud: u32,
+) -> Result<Setup, OperationError> {
     consents(
         probe,
         "2. With the printer's own screen (Move axis), bring the finger over one end of the sample, 5 mm inside, so \
@@ -271,7 +297,7 @@ async fn lies(
     };
     printer.begin_setup(setup.clone(), [end[axis as usize], end[2]]);
     writeln!(
-        words,
+        probe.words(),
         "   It slides along {} over {along:.0} mm.",
         axis.letter()
     )?;
@@ -279,7 +305,8 @@ async fn lies(
 }
 
 /// Sets a printer up with a person beside it: says at each step what it does next, and moves nothing before the person
-/// has said that the way is free. Returns what is to be kept.
+/// has said that the way is free. Goes on with the set-up that the printer has, if a run before has left one. Returns
+/// what is to be kept.
 pub async fn set_up(
     probe: &Probe,
     printer: &Printer,
@@ -287,9 +314,13 @@ pub async fn set_up(
     baud: u32,
 ) -> Result<Setup, OperationError> {
     let mut words = probe.words();
-    let mut setup = lies(probe, printer, port, baud).await?;
+    let dialect = greet(probe, printer, port).await?;
+    let mut setup = match left(probe, printer).await? {
+        Some(setup) => setup,
+        None => lies(probe, printer, dialect, port, baud).await?,
+    };
     let along = (setup.sample_mm[1] - setup.sample_mm[0]).abs();
-    printer.move_up().await.map_err(failed)?;
+    printer.park(printer.at()[1] + 5.0).await.map_err(failed)?;
     consents(
         probe,
         "4. It has moved 5 mm by the screw of Z.",
@@ -397,12 +428,7 @@ impl Printer {
     fn begin_setup(&self, setup: Setup, at: [f64; 2]) {
         let mut state = self.state();
         state.measures_backlash = setup.stiffness_n_mm.is_none();
-        (state.setup, state.at) = (Some(setup), at);
-    }
-
-    async fn move_up(&self) -> Result<(), PrinterError> {
-        let [along, z] = self.at();
-        self.go(along, z + 5.0, 5.0).await
+        (state.setup, state.at, state.parked) = (Some(setup), at, true);
     }
 
     async fn park(&self, z: f64) -> Result<(), PrinterError> {

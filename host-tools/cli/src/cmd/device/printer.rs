@@ -36,7 +36,7 @@ Examples:
   tactus device printer setup --printer COM5 --baud 250000
 
 Each step says what it does next, and waits for a line: y or n. Nothing moves before you have said that the way is free;
-the first approach is at 0.5 mm/s. Ctrl-C lifts the finger; nothing is kept then, and the command begins again.")]
+the first approach is at 0.5 mm/s. Ctrl-C lifts the finger; the same command goes on after step 3 if nothing was moved.")]
 pub(crate) struct SetUp {
     #[command(flatten)]
     at: Where,
@@ -89,12 +89,24 @@ fn set_up_one(args: &SetUp, out: &mut impl Write) -> anyhow::Result<()> {
         ..args.at.clone()
     };
     let (mut bench, _) = Bench::open(&place, Format::Text)?;
-    let open = OpenPrinter::bare(&port, args.baud)?;
+    // what a set-up before has left, once
+    let mut part = file.clone().into_os_string();
+    part.push(".part");
+    let left = Setup::read_file(Path::new(&part)).ok();
+    let left = left.filter(|left| left.port == port && left.baud == args.baud);
+    let _ = std::fs::remove_file(&part);
+    let open = OpenPrinter::bare(&port, args.baud, left)?;
     let printer = open.printer.clone();
     bench.move_by(open);
     bench.takes_lines = true;
     let probe = bench.probe.clone();
-    let setup = bench.done(set_up(&probe, &printer, &port, args.baud), out)?;
+    let done = bench.done(set_up(&probe, &printer, &port, args.baud), out);
+    if done.is_err()
+        && let Some(left) = printer.setup().filter(|left| left.parked.is_some())
+    {
+        left.write_file(Path::new(&part))?;
+    }
+    let setup = done?;
     setup.write_file(&file)?;
     writeln!(
         out,
