@@ -5,7 +5,7 @@ use std::time::Duration;
 use tactus_core::rig::arm::ArmState;
 
 use super::gcode::{Dialect, LineError};
-use super::{PROBE_GONE, Printer, PrinterError, Result, State};
+use super::{PROBE_GONE, Press, Printer, PrinterError, Result, State};
 use crate::probe::turn;
 
 /// Speeds in the air, mm/s: along the sample, and up and down (Marlin's usual limit of a screw).
@@ -17,6 +17,12 @@ pub(super) const TOO_HARD: (f64, f64) = (1.15, 0.1);
 const LATE_FORCES: u64 = 4;
 /// Force at which a slide is ended without the probe's order, N.
 const HARDEST_N: f64 = 1.9;
+/// The force of a slide is a mean over as many of its reports, a tenth of a second: the texture's own is not followed.
+const MEAN_FORCES: f64 = 10.0;
+/// From a piece's line until its force is known, beside what is sent ahead, s.
+const FELT_S: f64 = 0.17;
+/// A slide's height follows the force by as much in a piece, and in all, mm.
+const FOLLOWS_MM: (f64, f64) = (0.01, 0.1);
 /// A piece of a slide, and what is sent ahead of the motion beside its ramp, s: an answer by a USB cable takes up to
 /// 0.02. Klipper plans so far ahead by itself.
 const PIECE_S: f64 = 0.05;
@@ -49,6 +55,65 @@ pub(super) struct Path {
     pub(super) steady_s: f64,
     /// Length at constant speed from then on, mm.
     pub(super) length_mm: f64,
+    /// Force to be held, N.
+    pub(super) newton: f64,
+}
+
+/// A slide under way. Its height follows the force: two touches tell the tilt of a smooth sample, not of a coarse one.
+pub(super) struct Slide {
+    number: u16,
+    path: Path,
+    stiffness_n_mm: f64,
+    steady: bool,
+    /// Force, N, mean over some reports, and the last of them.
+    mean: f64,
+    heard: u64,
+    /// Height over the line, mm.
+    off_mm: f64,
+}
+
+impl Slide {
+    fn new(number: u16, path: Path, press: Press) -> Self {
+        Self {
+            number,
+            path,
+            stiffness_n_mm: press.stiffness_n_mm,
+            steady: false,
+            mean: path.newton,
+            heard: 0,
+            off_mm: 0.0,
+        }
+    }
+
+    /// Errors: the force is too high.
+    fn look(&mut self, state: &mut State, since_s: f64) -> Result<()> {
+        // the probe looks for less
+        let newton = state.felt()?;
+        if newton > HARDEST_N {
+            return Err(PrinterError::Unsteady(HARDEST_N));
+        }
+        if since_s < self.path.steady_s {
+            return Ok(());
+        }
+        if self.heard != state.force.2 {
+            self.heard = state.force.2;
+            self.mean += (newton - self.mean) / MEAN_FORCES;
+        }
+        if !self.steady {
+            self.steady = true;
+            state.reach(self.number, ArmState::Steady);
+        }
+        Ok(())
+    }
+
+    /// Height of the next piece over the line, mm, where so much is sent ahead, s: slower than what is told is late.
+    fn follow(&mut self, ahead_s: f64) -> f64 {
+        let (step, most) = FOLLOWS_MM;
+        let gain = PIECE_S / (2.0 * (ahead_s + FELT_S));
+        let off = gain * (self.mean - self.path.newton) / self.stiffness_n_mm;
+        self.off_mm = (self.off_mm + off.clamp(-step, step)).clamp(-most, most);
+        self.off_mm
+    }
 }
 
 impl State {
@@ -351,13 +416,15 @@ impl Printer {
             return Err(PrinterError::NotSetUp);
         };
         let setup = self.set_up()?;
-        let slope = self.state().press.map_or(0.0, |press| press.slope);
-        let to_z = self.state().at[1] + slope * (path.to_mm - path.from_mm);
+        let Some(press) = self.state().press else {
+            return Err(PrinterError::NotSetUp);
+        };
+        let to_z = self.state().at[1] + press.slope * (path.to_mm - path.from_mm);
         let took = self
             .glide(
                 [path.to_mm, to_z],
                 path.speed,
-                Some((number, path.steady_s)),
+                Some(Slide::new(number, path, press)),
             )
             .await?;
         let wanted = setup.seconds(path.to_mm - path.from_mm, path.speed);
@@ -371,7 +438,8 @@ impl Printer {
         let middle = (soonest + latest) / 2.0;
         let speed = path.speed * wanted / (wanted + late - middle);
         Ok(ArmState::Slid {
-            length_um: (path.length_mm * speed / path.speed * 1e3) as u32,
+            // a slower one is at constant speed sooner
+            length_um: (path.length_mm * 1e3) as u32,
             speed_um_s: (speed * 1e3) as u32,
         })
     }
@@ -382,7 +450,7 @@ impl Printer {
         &self,
         to: [f64; 2],
         speed: f64,
-        reports: Option<(u16, f64)>,
+        mut slide: Option<Slide>,
     ) -> Result<f64> {
         let (axis, letter) = self.along();
         let (from, dialect) = {
@@ -397,33 +465,27 @@ impl Printer {
             _ => (AHEAD_S, 0.0),
         };
         let begun = self.now();
-        let (mut steady, mut moves_s) = (false, 0.0);
-        let mut look = |state: &mut State| -> Result<f64> {
+        let mut moves_s = 0.0;
+        let look = |state: &mut State, slide: &mut Option<Slide>| -> Result<f64> {
             if state.is_replaced() {
                 return Err(PrinterError::Replaced);
             }
             let since = state.now.saturating_sub(begun).as_secs_f64();
-            if let Some((number, steady_s)) = reports {
-                // the probe looks for less by a mean, since P_DC rings with a texture
-                if state.felt()? > HARDEST_N {
-                    return Err(PrinterError::Unsteady(HARDEST_N));
-                }
-                if since >= steady_s && !steady {
-                    steady = true;
-                    state.reach(number, ArmState::Steady);
-                }
+            if let Some(slide) = slide {
+                slide.look(state, since)?;
             }
             Ok(since)
         };
         for piece in 1..=pieces {
             let share = f64::from(piece) / f64::from(pieces);
             let before_s = f64::from(piece - 1) / f64::from(pieces) * length.abs() / speed;
-            let due = self.until(|state| match look(state) {
+            let due = self.until(|state| match look(state, &mut slide) {
                 Ok(since) => (since >= before_s - ahead).then_some(Ok(())),
                 Err(why) => Some(Err(why)),
             });
             due.await??;
-            let [along, z] = [0, 1].map(|n| from[n] + share * (to[n] - from[n]));
+            let [along, line] = [0, 1].map(|n| from[n] + share * (to[n] - from[n]));
+            let z = line + slide.as_mut().map_or(0.0, |slide| slide.follow(ahead));
             let code = format!("G1 {letter}{along:.3} Z{z:.4} F{:.1}", speed * 60.0);
             self.state().at = [along, z];
             self.line(&code, 0.0).await?;
@@ -446,7 +508,7 @@ impl Printer {
             state.talk.send("M400", now);
         }
         let moved = self.until(|state| {
-            if let Err(why) = look(state) {
+            if let Err(why) = look(state, &mut slide) {
                 return Some(Err(why));
             }
             if state.talk.is_answered() {

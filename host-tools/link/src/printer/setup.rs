@@ -184,6 +184,7 @@ impl Setup {
             speed,
             steady_s,
             length_mm,
+            newton: f64::from(movement.force_mn) * 1e-3,
         })
     }
 }
