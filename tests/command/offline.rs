@@ -43,9 +43,10 @@ fn a_simulated_probe_recognises_a_texture() {
     let shown = at.printed("");
     assert_says(
         &shown,
-        &["touching it", "An unknown texture, one of 20", "Slide 1:"],
+        &["touching it", "An unknown texture, one of 60", "Slide 3:"],
     );
-    assert_says(&shown, &["because", "█", "Right.", "Try first"]);
+    assert_says(&shown, &["because", "█", "after 1 slide.", "tactus --help"]);
+    assert_eq!(shown.matches("Right.").count(), 2);
     let burlap = "identify --simulated --texture burlap --among 5 --seed 3";
     let shown = at.printed(burlap);
     assert_says(&shown, &["one of 5", "Under the finger: Burlap"]);

@@ -1,6 +1,6 @@
 //! The generated parts that come from sources: tables of faults, gates, messages, fields, settings, commands of xtask.
 
-use syn::{Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Type};
+use syn::{Expr, Item, ItemEnum, Lit};
 use tactus_core::rig::FAULTS;
 use tactus_link::bringup::{MISTAKES, STEPS};
 
@@ -149,28 +149,6 @@ fn error_text(attributes: &[syn::Attribute]) -> Option<String> {
     })
 }
 
-/// A type as it is written, without generic noise and in one line of a table.
-fn written(kind: &Type) -> String {
-    use quote::ToTokens as _;
-    let text = kind.to_token_stream().to_string();
-    text.replace(" ", "").replace(',', ", ").replace('|', "\\|")
-}
-
-fn fields(of: &Fields) -> String {
-    let field = |field: &syn::Field| {
-        let kind = format!("`{}`", written(&field.ty));
-        match &field.ident {
-            Some(name) => {
-                let about = doc(&field.attrs);
-                let about = about.trim_end_matches('.');
-                format!("`{name}` {kind}: {about}")
-            }
-            None => kind,
-        }
-    };
-    of.iter().map(field).collect::<Vec<_>>().join("; ")
-}
-
 fn wire() -> String {
     let mut files = sources("shared/src/wire");
     files.insert(0, syn::parse_file(&read("shared/src/wire.rs")).unwrap());
@@ -185,43 +163,19 @@ fn wire() -> String {
     let mut text = section("shared/src", "A frame is a message");
     text += "\nA message is in [postcard](https://postcard.jamesmunns.com)'s format, in which a variant is its \
      number.\n";
-    let mut told = Vec::new();
     for (heading, name) in [
         ("Commands of the host", "Command"),
         ("Events of the probe", "Event"),
     ] {
         let found = an_enum(name);
-        told.push(&found.ident);
         text += &format!(
-            "\n## {heading}\n\n| number | `{}` | what it is | fields |\n|---|---|---|---|\n",
+            "\n## {heading}\n\n| number | `{}` | what it is |\n|---|---|---|\n",
             found.ident
         );
         for (number, variant) in found.variants.iter().enumerate() {
             let about = doc(&variant.attrs);
-            let fields = fields(&variant.fields);
-            text += &format!("| {number} | `{}` | {about} | {fields} |\n", variant.ident);
+            text += &format!("| {number} | `{}` | {about} |\n", variant.ident);
         }
-    }
-    text += "\n## What they hold\n";
-    for item in &items {
-        text += &match item {
-            Item::Struct(found) if is_sent(&found.attrs) => held(found),
-            Item::Enum(found) if is_sent(&found.attrs) && !told.contains(&&found.ident) => {
-                let variants = found.variants.iter().enumerate();
-                let rows = variants.map(|(number, variant)| {
-                    let (fields, about) = (fields(&variant.fields), doc(&variant.attrs));
-                    format!("| {number} | `{}` | {about} | {fields} |\n", variant.ident)
-                });
-                let head = "| number | variant | what it is | fields |\n|---|---|---|---|\n";
-                let about = doc(&found.attrs);
-                format!(
-                    "\n`{}`: {about}\n\n{head}{}",
-                    found.ident,
-                    rows.collect::<String>()
-                )
-            }
-            _ => continue,
-        };
     }
     text
 }
@@ -236,21 +190,6 @@ pub(super) fn is_sent(attributes: &[syn::Attribute]) -> bool {
                 .to_string()
                 .contains("Serialize")
     })
-}
-
-fn held(found: &ItemStruct) -> String {
-    let rows = found.fields.iter().map(|field| {
-        let name = field.ident.as_ref().map(ToString::to_string);
-        let (name, about) = (name.unwrap_or_default(), doc(&field.attrs));
-        format!("| `{name}` | `{}` | {about} |\n", written(&field.ty))
-    });
-    let head = "| field | type | what it is |\n|---|---|---|\n";
-    let about = doc(&found.attrs);
-    format!(
-        "\n`{}`: {about}\n\n{head}{}",
-        found.ident,
-        rows.collect::<String>()
-    )
 }
 
 /// The value of a constant below `folder`, as its expression.

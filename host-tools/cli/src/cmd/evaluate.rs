@@ -81,7 +81,7 @@ fn print_evaluation(e: &Evaluation, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{note}")?;
     }
     if let Some(figures) = &e.open_set {
-        writeln!(out, "Its own figures: {}", open_set::in_words(figures))?;
+        writeln!(out, "Its own figures: {}", open_set::in_lines(figures))?;
     }
     let row = |name: &str, value| format!("  {name:<26} {value}");
     let share = |share: f64| format!("{:5.1} %", share * 100.0);

@@ -134,7 +134,7 @@ struct Identification {
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let canvas = args.plot.open()?;
     if args.simulated {
-        return identify_simulated(args, canvas, out);
+        return identify_simulated(args, None, canvas, out);
     }
     let folder = args.from.folder()?;
     let material = args.material.as_deref();
@@ -358,22 +358,29 @@ struct Demonstration {
 pub(crate) fn demonstrate(out: &mut impl Write) -> anyhow::Result<()> {
     writeln!(
         out,
-        "Tactus tells what a surface is by touching it. Here is a simulated probe: a BioTac fingertip on a lever, \
-         over a\n\
-         stage that slides the sample. It learns twenty textures, five trials each at three movements, and is then \
-         given\n\
-         one of them without being told which. The firmware's own core measures, decides and controls the rig.\n"
+        "Tactus tells what a surface is by touching it. A simulated fingertip has learned 60 textures, five slides\n\
+         at each of three movements. It is given one of them, and is not told which. The firmware's own code\n\
+         measures and decides.\n\n\
+         As published in 2012, each slide shows one property. The probe chooses the movement and the property\n\
+         that should tell the remaining candidates apart best.\n"
     )?;
     out.flush()?;
-    let Demonstration { args } = Demonstration::parse_from(["identify", "--simulated"]);
-    identify_simulated(&args, None, out)?;
-    writeln!(out, "\n{FIRST_STEPS}\n\nAll commands: tactus --help")?;
+    let parsed = |method: &str| {
+        let words = "identify --simulated --among 60 --seed 2 --method";
+        Demonstration::parse_from(words.split(' ').chain([method])).args
+    };
+    let [paper, fused] = ["paper", "fused"].map(parsed);
+    let then = "\nBy default each slide shows everything at once: traction and 26 band powers.\n\n";
+    identify_simulated(&paper, Some((then, &fused)), None, out)?;
+    writeln!(out, "\nWhat to try next, and all commands: tactus --help")?;
     Ok(())
 }
 
+/// Explores, and `then`, below a heading, once more with other arguments from the same slides.
 fn identify_simulated(
     args: &Args,
-    canvas: Option<Canvas>,
+    then: Option<(&str, &Args)>,
+    mut canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<Done> {
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
@@ -388,44 +395,51 @@ fn identify_simulated(
         u32::try_from(args.train_slides).context("--train-slides")?,
     );
     let calibration = calibrated(collection.setup(unknown, 0))?;
-    let method = args.method.unwrap_or(Method::Fused).method();
     let textures = collection.textures.len() as u64;
-    let bytes = with_progress(textures, "learning textures", |done| {
-        collection.learn(method, calibration, done)
+    let slides = with_progress(textures, "learning textures", |done| {
+        collection.record(calibration, done)
     })?;
-    let table = Table::read(&bytes)?;
-    let mut rig = SimRig::new(collection.setup(unknown, 1 + u64::from(random.next_u32() % 1000)));
-    rig.control().calibrate(calibration)?;
+    let trial = 1 + u64::from(random.next_u32() % 1000);
     let name = texture_name(unknown);
-    let is_text = args.format == Format::Text;
-    if is_text {
-        writeln!(
-            out,
-            "An unknown texture, one of {}. Under the finger: {name} (seed {}).",
-            table.textures(),
-            args.seed
-        )?;
+    let mut done = Done::Fully;
+    for (heading, args) in [("", args)].into_iter().chain(then) {
+        let method = args.method.unwrap_or(Method::Fused).method();
+        let bytes = collection.learn_from(method, &slides)?;
+        let table = Table::read(&bytes)?;
+        let mut rig = SimRig::new(collection.setup(unknown, trial));
+        rig.control().calibrate(calibration)?;
+        let is_text = args.format == Format::Text;
+        if is_text {
+            writeln!(
+                out,
+                "{heading}An unknown texture, one of {}. Under the finger: {name} (seed {}).",
+                table.textures(),
+                args.seed
+            )?;
+        }
+        let never = |_: &_| false;
+        let mut presented = Presented::new(name, table);
+        let random = &mut random.clone();
+        let found = explore_and_show(&mut rig, &mut presented, args, random, never, out)?;
+        let seconds = rig.now().as_secs_f64();
+        let skin = rig.control().skin();
+        let found = Identification {
+            rig_s: Some(seconds),
+            skin_j: Some(skin.energy_j()),
+            ..found
+        };
+        if is_text {
+            writeln!(
+                out,
+                "{seconds:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
+                skin.energy_j(),
+                if skin.is_worn() { ", look at it" } else { "" }
+            )?;
+        } else {
+            print_json(&found, out)?;
+        }
+        presented.draw(canvas.take(), args, out)?;
+        done = found.done();
     }
-    let never = |_: &_| false;
-    let mut presented = Presented::new(name, table);
-    let found = explore_and_show(&mut rig, &mut presented, args, &mut random, never, out)?;
-    let seconds = rig.now().as_secs_f64();
-    let skin = rig.control().skin();
-    let found = Identification {
-        rig_s: Some(seconds),
-        skin_j: Some(skin.energy_j()),
-        ..found
-    };
-    if is_text {
-        writeln!(
-            out,
-            "{seconds:.0} s of the rig's time; skin: {:.2} J of sliding{}.",
-            skin.energy_j(),
-            if skin.is_worn() { ", look at it" } else { "" }
-        )?;
-    } else {
-        print_json(&found, out)?;
-    }
-    presented.draw(canvas, args, out)?;
-    Ok(found.done())
+    Ok(done)
 }

@@ -149,7 +149,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let observed: Vec<_> = observed.collect();
     writeln!(out, "{}", basis::in_words(Table::read(&bytes)?, &observed))?;
     if let Some(figures) = Table::read(&bytes)?.open_set() {
-        writeln!(out, "{}", open_set::in_words(&figures))?;
+        writeln!(out, "{}", open_set::in_lines(&figures))?;
         if let Some(missing) = open_set::not_known(&taught) {
             writeln!(out, "{missing}")?;
         }

@@ -185,7 +185,7 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
     }
     writeln!(out, "{samples}")?;
     if let Some(figures) = &report.table.open_set {
-        writeln!(out, "{}", open_set::in_words(figures))?;
+        writeln!(out, "{}", open_set::in_lines(figures))?;
     }
     if let Some(recorded) = &report.recorded {
         let explorations = count(recorded.explorations as u64, "exploration");

@@ -255,6 +255,11 @@ pub fn in_words(figures: &OpenSet) -> String {
     )
 }
 
+/// The same sentence in lines for a terminal.
+pub fn in_lines(figures: &OpenSet) -> String {
+    in_words(figures).replace(", ", ",\n  ")
+}
+
 /// A sentence on what the figures do not say, as all slides are of one session.
 pub fn not_known(taught: &Taught) -> Option<&'static str> {
     let mut sessions = taught

@@ -220,7 +220,7 @@ impl<'t, W: Write> Show<'t, W> {
         let rest = if rest.is_empty() {
             String::new()
         } else {
-            format!(" ({})", rest.join("; "))
+            format!("\n    (next best: {})", rest.join("; "))
         };
         format!(
             "{} should leave {} uncertainty{rest}",
@@ -369,7 +369,7 @@ pub fn show_table(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
             (None, None) => {}
         }
         if let Some(figures) = table.open_set() {
-            writeln!(out, "{}", open_set::in_words(&figures))?;
+            writeln!(out, "{}", open_set::in_lines(&figures))?;
         }
         show_samples(table, out)?;
         return show_whitened(table, out);

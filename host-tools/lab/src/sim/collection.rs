@@ -168,18 +168,37 @@ impl Collection {
     pub fn learn_at(
         &self,
         movements: &[Movement],
-        (method, features): (Method, Option<FeatureSet>),
+        how: (Method, Option<FeatureSet>),
         lengths_ms: &[u16],
         calibration: RigCalibration,
         done: impl Fn() + Sync,
     ) -> Result<Vec<u8>, LearnError> {
         let slides = self.record_at(movements, calibration, done)?;
+        self.table_of(movements, how, lengths_ms, &slides)
+    }
+
+    /// Learns a texture table for a method from the slides that [`Collection::record`] made.
+    pub fn learn_from(
+        &self,
+        method: Method,
+        slides: &[Vec<Recording>],
+    ) -> Result<Vec<u8>, LearnError> {
+        self.table_of(&Self::MOVEMENTS, (method, None), &[], slides)
+    }
+
+    fn table_of(
+        &self,
+        movements: &[Movement],
+        how: (Method, Option<FeatureSet>),
+        lengths_ms: &[u16],
+        slides: &[Vec<Recording>],
+    ) -> Result<Vec<u8>, LearnError> {
         let plan = Plan::new();
         let textures = slides.iter().zip(&self.textures);
         let trials: Vec<Vec<Vec<ObservedTrial>>> = textures
             .map(|(slides, &texture)| self.observe(&plan, movements, texture, slides, lengths_ms))
             .collect::<Result<_, TrialError>>()?;
-        let (usual, how) = (Expected::default(), (method, features));
+        let usual = Expected::default();
         let table =
             learn::learn_lengths(&usual, how, &self.names(), movements, lengths_ms, &trials)?;
         let named = learn::name_finger(&table, FingerCode::of(self.finger), 0, "");

@@ -59,7 +59,7 @@ pub(crate) fn leave_one_out(
         )?;
     }
     if let Some(figures) = &novelty.open_set {
-        writeln!(out, "Its own figures: {}", open_set::in_words(figures))?;
+        writeln!(out, "Its own figures: {}", open_set::in_lines(figures))?;
     }
     let (new, known) = (&novelty.verdicts_new, &novelty.verdicts_known);
     writeln!(

@@ -32,10 +32,10 @@
 //! The hash is the SHA-256 of the whole file in hexadecimal, or empty. The rows may come in any order; textures are
 //! taken in the order of their first row. Texts hold no character that does not print.
 //!
-//! All streams of a slide cover the same time. A slide is refused, and `tactus import` leaves it out, where P_AC does
-//! not change for 100 ms, stands at an end of the converter's range, has more than a quarter of its samples there,
+//! All streams of a slide cover the same time. Commands refuse a slide, and `tactus import` leaves it out, where P_AC
+//! does not change for 100 ms, stands at an end of the converter's range, has more than a quarter of its samples there,
 //! has more than a third of the samples of other slides in it, shifted or not, or lasts longer or shorter than another
-//! stream. More than 1 % cut off is told.
+//! stream. They report more than 1 % of samples at an end of the range.
 use std::collections::HashMap;
 use std::collections::hash_map::Entry as Place;
 use std::path::Path;
