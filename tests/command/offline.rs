@@ -86,7 +86,7 @@ fn an_exploration_is_text_and_one_object() {
         assert!((sum - 1.0).abs() < 1e-3, "{slide}");
     }
     // not sure: 3, and the object is whole all the same
-    let found = at.json(&format!("{identify} corduroy --threshold 1"), 3);
+    let found = at.json(&format!("{identify} corduroy --threshold 1"), 4);
     assert_eq!(found["verdict"]["told"], "undecided");
     assert!(found["right"].is_null());
     // no slide comes twice, and nothing is ever more probable than 1

@@ -473,7 +473,7 @@ fn no_sentence_of_the_report_can_be_stale() {
     let useful = &rows("table-most-useful-movements")[1..];
     let same = useful.iter().filter(|row| row[1] == row[3]).count();
     let said = format!(
-        "Of the {} most useful movements {same} are the paper's.",
+        "Most useful movements that are the paper's: {same} of {}.",
         useful.len()
     );
     crate::assert_says(

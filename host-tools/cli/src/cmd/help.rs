@@ -115,10 +115,10 @@ mod tests {
                         !(goes_on && is_text && fits && same),
                         "{name}, {width}: {line:?}"
                     );
-                    assert!(
-                        line[0].chars().count() <= width,
-                        "{name}, {width}: {line:?}"
-                    );
+                    let is_wide = line[0].chars().count() > width;
+                    // which clap never breaks
+                    let is_usage = line[0].starts_with("Usage");
+                    assert!(!is_wide || is_usage, "{name}, {width}: {line:?}");
                     *seen += 1;
                 }
             }
