@@ -357,8 +357,8 @@ fn scatter(table: Table<'_>, texture: u16, slides: &[Vec<Observation>]) -> Optio
     (features > 0.0).then(|| ((within / freedoms).sqrt(), (away / features).sqrt()))
 }
 
-/// Advice for the table's user.
-fn advice(report: &Report) -> Vec<String> {
+/// Advice for textures that are taken for each other.
+fn of_pairs(report: &Report) -> Vec<String> {
     let mut advice = Vec::new();
     let mut pairs: Vec<&Pair> = Vec::new();
     for pair in &report.pairs {
@@ -392,6 +392,12 @@ fn advice(report: &Report) -> Vec<String> {
             "Pairs that take long to tell apart: {slow}. More trials of both would help."
         ));
     }
+    advice
+}
+
+/// Advice for the table's user.
+fn advice(report: &Report) -> Vec<String> {
+    let mut advice = of_pairs(report);
     for few in 0..ENOUGH_TRIALS {
         let fewest = |t: &&TextureReport| t.trials.iter().min() == Some(&few);
         let names = report
