@@ -25,7 +25,7 @@ pub use config::{Config, ExplorerError, Method, NEGLIGIBLE, ObserveError, Strate
 pub use early::{Look, most_doubt};
 pub use episode::EpisodeSummary;
 pub use posterior::{Explorer, LEADING, Verdict, VerdictKind};
-pub use verify::ENOUGH_TRIALS;
+pub use verify::{ENOUGH_TRIALS, same_below};
 
 #[cfg(test)]
 mod tests;

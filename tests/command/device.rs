@@ -371,6 +371,11 @@ fn a_probe_verifies_keeps_its_settings_and_is_refreshed() {
 #[test]
 fn flash_says_what_it_runs_and_what_is_missing() {
     let at = Scratch::new();
+    assert_says(
+        &at.error("device flash --dry-run t/elf", 1),
+        &["t/elf: no such file"],
+    );
+    at.write("t/elf", "");
     let lines = at.printed("device flash --dry-run t/elf");
     assert_eq!(
         lines,

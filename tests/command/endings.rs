@@ -24,7 +24,7 @@ fn a_reader_that_leaves_ends_the_printing_and_not_the_verdict() {
     at.log("identify");
     let unsure = "identify --simulated --among 3 --threshold 1 --max-slides 2";
     for (line, code) in [
-        (unsure, 3),
+        (unsure, 4),
         (DIFFERENT, 3),
         ("features --recordings SIMULATED", 0),
         ("learn --recordings SIMULATED --out -", 0),

@@ -24,7 +24,7 @@ fn help_says_what_it_is_and_what_to_try_first() {
         &["touching it", "Try first", "tactus identify --recordings"],
     );
     assert_says(&help, &["https://github.com/dexrob/BioTac_slide_20_50"]);
-    assert_says(&help, &["Exit codes", "3 not identified", "TACTUS_PORT"]);
+    assert_says(&help, &["Exit codes", "4     not sure yet", "TACTUS_PORT"]);
     for command in "features learn table identify evaluate simulate import".split(' ') {
         assert!(help.contains(command), "{command}");
         assert_says(&at.printed(&format!("{command} --help")), &["Usage"]);
@@ -87,7 +87,7 @@ fn an_exploration_is_text_and_one_object() {
         assert!((sum - 1.0).abs() < 1e-3, "{slide}");
     }
     // not sure: 3, and the object is whole all the same
-    let found = at.json(&format!("{identify} corduroy --threshold 1"), 3);
+    let found = at.json(&format!("{identify} corduroy --threshold 1"), 4);
     assert_eq!(found["verdict"]["told"], "undecided");
     assert!(found["right"].is_null());
     // no slide comes twice, and nothing is ever more probable than 1
@@ -166,7 +166,7 @@ fn tables_and_features_are_objects() {
         .map(|l| serde_json::from_str(l).unwrap())
         .collect();
     assert_eq!((lines.len(), &lines[1]["trial"]), (54, &2.into()));
-    assert!((number(&lines[0]["force_n"]) - 1.262).abs() < 1e-3);
+    assert_eq!(lines[0]["force_n"], 1.262);
     let csv = at.printed("features --recordings SIMULATED --format csv");
     let second = csv.lines().nth(2).unwrap();
     assert!(
@@ -253,7 +253,7 @@ fn an_evaluation_is_one_object_and_says_how_reliable_it_is() {
     }
     // one statement after each slide until the answer
     let told = number(&found["mean_slides_told"]);
-    assert!((slides / 60.0 - told).abs() < 1e-9, "{slides} {told}");
+    assert!((slides / 60.0 - told).abs() < 1e-5, "{slides} {told}");
 }
 
 #[test]
@@ -328,7 +328,7 @@ fn a_gauge_study_compares_operators_of_several_folders() {
         let sd = |name: &str| gauge["sd"][name].as_f64();
         assert_eq!((sd("operator"), sd("operator_by_part")), (None, None));
         let all = sd("gauge").unwrap().hypot(sd("part").unwrap());
-        assert!((all - sd("total").unwrap()).abs() < 1e-9, "{gauge}");
+        assert!((all / sd("total").unwrap() - 1.0).abs() < 1e-5, "{gauge}");
     }
     // the same slides by two operators: nobody reads more than the other
     for name in ["Anna", "Ben"] {
@@ -358,7 +358,7 @@ fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
     let verdicts = &object["recorded"]["known"];
     let shares = ["right", "new", "wrong", "most_like", "undecided"];
     let sum: f64 = shares.iter().map(|name| number(&verdicts[name])).sum();
-    assert!((sum - 1.0).abs() < 1e-9, "{verdicts}");
+    assert!((sum - 1.0).abs() < 1e-5, "{verdicts}");
     // of three slides two were learned from: every exploration has three slides at most, one a movement
     for texture in textures {
         let slides = number(&texture["recorded"]["mean_slides"]);
@@ -372,6 +372,14 @@ fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
             "What users would be told, by 150 explorations",
             "What would help:",
         ],
+    );
+    let verdict = object["verdict"].as_str().unwrap();
+    assert!(text.starts_with(&format!("{verdict}\n\n")), "{text}");
+    let right = number(&verdicts["right"]) * 100.0;
+    let said = format!("the right name in {} %", (10.0 * right).round() / 10.0);
+    assert_says(
+        verdict,
+        &["All 6 textures are told apart by 1 slide", &said],
     );
     // well-formed, complete, and the map is in it
     let html = String::from_utf8(at.read("page.html")).unwrap();
@@ -407,7 +415,74 @@ fn slides_are_verified_against_a_texture_of_a_table_and_of_recordings() {
     let itself = "verify --reference SIMULATED --texture burlap --sample SIMULATED";
     assert_says(&at.error(itself, 1), &["--sample is the reference itself"]);
     let text = at.printed(&format!("{itself} --material 'Denim twill'"));
-    assert_says(&text, &["Different from Burlap"]);
+    assert!(text.starts_with("Different from Burlap"), "{text}");
+    // the last line explains the score that is printed, by its own numbers
+    let text = at.printed(&format!("{verify} corduroy"));
+    let (score, limit) = (number(&last["score"]), number(&last["limit"]));
+    let said = format!(
+        "Score {score:.1}: another texture explains the slides {:.0} times as well as Burlap does. Above {limit:.1}",
+        score.exp()
+    );
+    assert_says(
+        &text,
+        &[&said, "(2 % of Burlap's own would be), below -4.6 the same"],
+    );
+    assert_eq!(
+        other["same_below"].as_f64().map(|x| (10.0 * x).round()),
+        Some(-46.0)
+    );
+    // too strict a threshold leaves it open
+    let open = at.json(&format!("{verify} burlap --threshold 1 --max-slides 1"), 4);
+    assert_eq!(open["answer"], "unsure");
+}
+
+/// Two lots in one folder: one is held against the other, and every command can look at one of them.
+#[test]
+fn slides_are_selected_by_lot_and_session() {
+    let at = Scratch::new();
+    at.recordings("lots", |line| {
+        match line.strip_suffix(",,,,biotac,,,1,,,") {
+            Some(line) => {
+                let slide: u32 = line.split(',').nth(2)?.parse().ok()?;
+                let (lot, day) = if slide % 3 == 0 {
+                    ("8", "tuesday")
+                } else {
+                    ("7", "monday")
+                };
+                Some(format!("{line}{lot},,,,biotac,,,1,{day},,"))
+            }
+            None => Some(line.to_owned()),
+        }
+    });
+    for (only, rows) in [
+        ("", 54),
+        ("--only lot=8", 18),
+        ("--only lot=7 --only session=monday", 36),
+    ] {
+        let csv = at.printed(&format!("features --recordings lots {only} --format csv"));
+        assert_eq!(csv.lines().count(), rows + 1, "{only}");
+    }
+    let none = at.error(
+        "features --recordings lots --only lot=8 --only session=monday",
+        1,
+    );
+    assert_says(
+        &none,
+        &["lot=8 (7, 8) and session=monday (monday, tuesday)"],
+    );
+    let verify = "verify --reference lots --texture burlap --sample lots --only lot=8";
+    let same = at.json(&format!("{verify} --material burlap"), 0);
+    assert_eq!(
+        (&same["answer"], &same["reference_slides"]),
+        (&"same".into(), &2.into())
+    );
+    assert_eq!(
+        at.json(&format!("{verify} --material corduroy"), 3)["answer"],
+        "different"
+    );
+    at.printed("learn --recordings lots --only lot=7 --train-slides 2 --out table");
+    let report = at.json("report table --recordings lots --only lot=8", 0);
+    assert_eq!(report["recorded"]["learned_left_out"], 0);
 }
 
 #[test]

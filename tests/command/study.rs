@@ -413,3 +413,134 @@ fn the_page_is_whole() {
     let command = "tactus study all --seed 5 --out <here> & now";
     crate::assert_says(&words, &["0.0.0-test", command, "world 5", "95.4"]);
 }
+
+/// The words of results on the page: the template's own have no figures but those of tables, pictures and equations,
+/// and what it takes from the study is what the tables beside it show.
+#[test]
+fn no_sentence_of_the_report_can_be_stale() {
+    let template = include_str!("../../host-tools/study/src/report/page.html");
+    let results = template.split("<section id=\"pilot\">").nth(1).unwrap();
+    let results = results.split("<section id=\"about\">").next().unwrap();
+    let own = words_of_its_own(results);
+    let counts = [
+        "three", "four", "five", "six", "seven", "eight", "nine", "ten", "sixteen",
+    ];
+    for pair in own.windows(2) {
+        let is_reference =
+            ["Table", "Fig.", "fig.", "eq."].contains(&pair[0].trim_start_matches('('));
+        let has_figure = pair[1].contains(|c: char| c.is_ascii_digit());
+        assert!(
+            is_reference || !has_figure,
+            "{pair:?}: let the study say it"
+        );
+        assert!(
+            !counts.contains(&&pair[1].to_lowercase()[..]),
+            "{pair:?}: let the study say it"
+        );
+    }
+
+    let files = files(shared());
+    let page = str::from_utf8(&files["report.html"]).unwrap();
+    let page = page.replacen("<!DOCTYPE html>", "", 1);
+    let page = roxmltree::Document::parse(page.trim()).unwrap();
+    let text = |node: roxmltree::Node<'_, '_>| -> String {
+        let texts = node
+            .descendants()
+            .filter(|n| n.is_text())
+            .filter_map(|n| n.text());
+        texts
+            .collect::<String>()
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let rows = |id: &str| -> Vec<Vec<String>> {
+        let table = page
+            .descendants()
+            .find(|n| n.attribute("id") == Some(id))
+            .unwrap();
+        let rows = table.descendants().filter(|n| n.tag_name().name() == "tr");
+        let cells = |row: roxmltree::Node<'_, '_>| {
+            row.children()
+                .filter(|n| n.is_element())
+                .map(text)
+                .collect()
+        };
+        rows.map(cells).collect()
+    };
+    let words = text(page.root());
+    let study = shared();
+    let useful = &rows("table-most-useful-movements")[1..];
+    let same = useful.iter().filter(|row| row[1] == row[3]).count();
+    let said = format!(
+        "Most useful movements that are the paper's: {same} of {}.",
+        useful.len()
+    );
+    crate::assert_says(
+        &words,
+        &[&said, "10 textures (Table 2), 36 movements, 6 slides each."],
+    );
+    crate::assert_says(&words, &["up to 2 N. A probe presses with 1.262 N at most"]);
+    let training = study.training.as_ref().unwrap();
+    let movements = (rows("table-table3-correlations").len() - 1) / 3;
+    let changed = training.textures.iter().filter(|t| t.new_skin).count();
+    let (nine, few) = training.pairs_confused;
+    crate::assert_says(
+        &words,
+        &[
+            &format!(
+                "117 textures, {movements} movements, 5 slides each: {} slides",
+                117 * 5 * movements
+            ),
+            &format!("The skin was changed {changed} time (before T60)"),
+            &format!(
+                "mean of all {}: {nine} of the {} pairs;",
+                3 * movements,
+                117 * 116 / 2
+            ),
+            &format!("by that of the most useful: {few}."),
+        ],
+    );
+    let pairs = rows("table-table4-pairs");
+    let mean = pairs.last().unwrap();
+    let said = format!(
+        "right in {} % here, and in {} % in the paper. 20 simulations",
+        mean[3], mean[2]
+    );
+    crate::assert_says(&words, &[&said, "more probable than 99.9 %"]);
+    let ways = rows("table-table5-identification");
+    let best = ways[0].iter().zip(&ways[1]).filter_map(|(name, right)| {
+        Some((name.strip_suffix(", here")?, right.parse::<f64>().unwrap()))
+    });
+    let best = best.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    let said = format!(
+        "Most often right here is {}, in {:.1} %. 160 simulations",
+        best.0, best.1
+    );
+    let textures = format!("one of {} textures is unknown", ways.len() - 6);
+    crate::assert_says(
+        &words,
+        &[&said, &textures, "ends at 99 %, or after 10 movements"],
+    );
+}
+
+/// The words that a template has of its own: without tags and statements, of expressions the texts only.
+fn words_of_its_own(template: &str) -> Vec<String> {
+    let mut own = String::new();
+    for part in template.split("{{") {
+        let (expression, rest) = part.split_once("}}").unwrap_or(("", part));
+        let texts = expression.split('"').skip(1).step_by(2);
+        texts
+            .filter(|text| text.contains(' '))
+            .for_each(|text| own += text);
+        own += " X ";
+        for part in rest.split("{%") {
+            let plain = part.split_once("%}").map_or(part, |(_, plain)| plain);
+            for part in plain.split('<') {
+                own += part.split_once('>').map_or(part, |(_, plain)| plain);
+                own += " ";
+            }
+        }
+    }
+    own.split_whitespace().map(str::to_owned).collect()
+}

@@ -52,7 +52,7 @@ fn compare(at: &Scratch, train_slides: u32, method: &str, more: &str, times: u64
     let shares = VERDICTS.map(|verdict| figures["verdicts"][verdict].as_f64().unwrap());
     println!("identify {counts:?} of {runs}, evaluate {shares:?}");
     assert!(
-        (shares.iter().sum::<f64>() - 1.0).abs() < 1e-9,
+        (shares.iter().sum::<f64>() - 1.0).abs() < 1e-5,
         "{shares:?}"
     );
     assert!(
@@ -83,7 +83,7 @@ fn a_name_that_too_many_new_textures_would_get_is_most_like() {
     let identify = "identify --recordings SIMULATED --table table --material Corduroy";
     let (share, is_said) = named("2,1");
     assert!(share > 0.1 && is_said, "{share}");
-    let found = at.json(identify, 3);
+    let found = at.json(identify, 4);
     assert_eq!(found["verdict"]["told"], "most-like");
     assert_eq!(found["verdict"]["texture"], "Corduroy");
     assert!(found["right"].is_null(), "{found}");

@@ -6,10 +6,10 @@ mod convert;
 mod device;
 mod evaluate;
 mod features;
+mod help;
 mod identify;
 mod import;
 mod learn;
-
 mod names;
 mod output;
 mod plot;
@@ -26,7 +26,7 @@ mod verify;
 
 use std::io::{self, Write as _};
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use tactus_lab::data::printable::Printable;
 
 pub(crate) use device::BenchError;
@@ -87,13 +87,21 @@ Environment:
   TACTUS_RECORDINGS   the folder, where --recordings is not given
   TACTUS_PORT         the probe's port, where --port is not given
 
-Exit codes: 0 done; 1 an error; 2 wrong usage; 3 not identified: none of those known, or not sure; 130 after Ctrl-C.";
+Exit codes:
+  0     done; of `identify` a sure name, of `verify` the same
+  1     an error
+  2     wrong usage
+  3     new or changed; of `verify` different
+  4     not sure yet
+  130   ended by Ctrl-C";
 
 pub(crate) fn run() -> anyhow::Result<Done> {
     // what others wrote, names and words of a probe, goes out as text
     let out = &mut Printable::new(io::BufWriter::new(printed::Printed(io::stdout())));
     let mut done = Done::Fully;
-    let Tactus { quiet, command } = Tactus::parse();
+    let matches = help::parse(Tactus::command());
+    let Tactus { quiet, command } =
+        Tactus::from_arg_matches(&matches).unwrap_or_else(|why| why.exit());
     if quiet {
         progress::be_quiet();
     }

@@ -10,7 +10,8 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     match cmd::run() {
         Ok(cmd::Done::Fully) => ExitCode::SUCCESS,
-        Ok(cmd::Done::NotIdentified) => ExitCode::from(3),
+        Ok(cmd::Done::Different) => ExitCode::from(3),
+        Ok(cmd::Done::Unsure) => ExitCode::from(4),
         Err(why) => {
             cmd::say(format_args!("error: {why:#}"));
             match why.downcast_ref::<cmd::BenchError>() {

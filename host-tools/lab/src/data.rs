@@ -2,6 +2,7 @@
 
 #[cfg(feature = "files")]
 pub mod import;
+pub mod json;
 pub mod printable;
 pub mod program;
 pub mod properties;

@@ -62,8 +62,8 @@ impl Inner {
         let movement = self.core.table().movement(action.movement);
         let expected = expected.iter().find(|outcome| outcome.action == action);
         Choice {
-            force_n: movement.map_or(f32::NAN, |m| m.force_n()),
-            speed_mm_s: movement.map_or(f32::NAN, |m| m.speed_mm_s()),
+            force_n: movement.map_or(f32::NAN, |m| m.written().0),
+            speed_mm_s: movement.map_or(f32::NAN, |m| m.written().1),
             property: action.property.map(|property| property.to_string()),
             uncertainty: expected.map(|outcome| outcome.uncertainty),
             benefit: expected.map(|outcome| outcome.benefit),

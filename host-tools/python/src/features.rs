@@ -48,13 +48,13 @@ impl Features {
     /// Contact force of the movement, N; 0 where it is unknown.
     #[getter]
     fn force_n(&self) -> f32 {
-        self.movement.force_n()
+        self.movement.written().0
     }
 
     /// Speed of the movement, mm/s; 0 where it is unknown.
     #[getter]
     fn speed_mm_s(&self) -> f32 {
-        self.movement.speed_mm_s()
+        self.movement.written().1
     }
 
     /// Mean tangential force at constant speed, N (eq. 14); None where the rig cannot measure it.

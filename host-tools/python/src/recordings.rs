@@ -252,7 +252,7 @@ impl Recordings {
     #[getter]
     fn settings(&self) -> Vec<(f32, f32)> {
         let movements = self.set.movements().into_iter();
-        movements.map(|m| (m.force_n(), m.speed_mm_s())).collect()
+        movements.map(|m| m.written()).collect()
     }
 
     /// The finger, and the day of its calibration as 20261121 (0: not known). Raises RecordingError where there are two
@@ -393,13 +393,13 @@ impl Slide {
     /// Contact force of the movement, N.
     #[getter]
     fn force_n(&self) -> f32 {
-        self.recording.movement.force_n()
+        self.recording.movement.written().0
     }
 
     /// Speed of the movement, mm/s.
     #[getter]
     fn speed_mm_s(&self) -> f32 {
-        self.recording.movement.speed_mm_s()
+        self.recording.movement.written().1
     }
 
     /// Start and end of the part at constant speed, s from the start of the record.

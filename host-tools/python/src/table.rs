@@ -194,7 +194,7 @@ impl Table {
     fn settings(&self) -> PyResult<Vec<(f32, f32)>> {
         let table = self.read()?;
         let movements = table.movements();
-        Ok(movements.map(|m| (m.force_n(), m.speed_mm_s())).collect())
+        Ok(movements.map(|m| m.written()).collect())
     }
 
     /// The best method for what the table holds: "fused" or "student-all", which shares its tables with "paper" and

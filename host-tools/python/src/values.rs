@@ -39,7 +39,7 @@ fn locked<T: Element, D: ndarray::Dimension>(
 /// # Errors
 /// It cannot be written, which no value of this package is.
 pub(crate) fn object<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
-    let text = serde_json::to_string(value);
+    let text = tactus_lab::data::json::text(value);
     let text = text.map_err(|why| PyRuntimeError::new_err(why.to_string()))?;
     py.import("json")?.call_method1("loads", (text,))
 }

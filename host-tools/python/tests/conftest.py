@@ -76,7 +76,7 @@ def command():
 
     def run(*arguments):
         done = subprocess.run([name, *map(str, arguments)], capture_output=True, text=True)
-        return done.stdout if done.returncode in (0, 3) else done.stderr.strip().removeprefix("error: ")
+        return done.stdout if done.returncode in (0, 3, 4) else done.stderr.strip().removeprefix("error: ")
 
     run.file = name
     return run

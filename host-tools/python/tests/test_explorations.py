@@ -82,7 +82,7 @@ def test_a_verification_is_the_commands(biotac, command, tmp_path):
         said = json.loads(command("verify", *at, "--material", material, "--format", "json"))
         # the command leaves the slides out that the table was learned from
         ours = tactus.verify(table, biotac.textures[0], biotac.measured_slides(material)[5:])
-        assert ours[-1]["false_accept"] == said["false_accept"]
+        assert ours[-1]["false_accept"] == pytest.approx(said["false_accept"], rel=1e-5)
         assert [(o["score"], o["limit"], o["answer"].lower()) for o in ours] == [
             (s["score"], s["limit"], s["answer"]) for s in said["slides"]
         ]

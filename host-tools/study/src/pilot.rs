@@ -109,8 +109,8 @@ impl Pilot {
         let uncertainty = uncertainty(movements, &reached, trials)?;
         let rows = movements.iter().zip(&uncertainty).enumerate();
         let rows = rows.map(|(m, (movement, uncertainty))| PilotMovement {
-            force_n: movement.force_n(),
-            speed_mm_s: movement.speed_mm_s(),
+            force_n: movement.written().0,
+            speed_mm_s: movement.written().1,
             high_wear: movement.is_high_wear(),
             uncertainty: *uncertainty,
             not_reached: missed(m),

@@ -9,14 +9,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, ensure};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use tactus_core::explorer::Config;
 use tactus_core::features::Property;
+use tactus_core::rig::most_mn;
 use tactus_lab::data::whole::{Lock, NewOutputs, write_whole};
 use tactus_lab::eval::evaluate::Method;
 
 use crate::chart::grid::{AVOIDED, Grid, Tile};
 use crate::chart::matrix::{SHADES, matrix};
 use crate::chart::{COLOURS, Figure};
-use crate::identify::{Column, Identification, METHODS, PairRow, of_pair, pairs_mean, short_name};
+use crate::identify::{
+    Column, Identification, MAX_SLIDES, METHODS, PairRow, of_pair, pairs_mean, short_name,
+};
 use crate::page::render;
 use crate::pilot::{MostUseful, Pilot, PilotMovement};
 use crate::published::{self, PILOT_TRIALS, TRIALS};
@@ -173,14 +177,36 @@ fn contents(study: &Study) -> Result<Contents> {
     }
     if let Some(found) = &study.pairs {
         pairs(found, &mut all);
-        all.words("pairs", json!({"simulations": of_pair(study.simulations)}));
+        let words = json!({
+            "simulations": of_pair(study.simulations),
+            "threshold": in_percent(Config::PAIR_THRESHOLD),
+            "right": format!("{:.1}", pairs_mean(found)),
+            "paper": format!("{:.1}", mean(found, |p| p.paper[1])),
+        });
+        all.words("pairs", words);
     }
     if let Some(found) = &study.identification {
         identification(found, &mut all);
-        let words = json!({"simulations": study.simulations});
+        let ways = METHODS.into_iter().zip(&found.columns);
+        let best = ways.max_by(|a, b| a.1.correct.total_cmp(&b.1.correct));
+        let words = json!({
+            "simulations": study.simulations,
+            "best": best.map(|(method, _)| short_name(method)),
+            "right": best.map(|(_, column)| format!("{:.1}", column.correct)),
+            "textures": found.textures.len(),
+            "trials": TRIALS,
+            "threshold": in_percent(Config::default().threshold),
+            "most": MAX_SLIDES,
+            "starred": published::CYCLING.median,
+        });
         all.words("identification", words);
     }
     Ok(all)
+}
+
+/// A share in %, without the digits of its binary form.
+fn in_percent(share: f32) -> String {
+    ((f64::from(share) * 1e4).round() / 1e2).to_string()
 }
 
 fn words<const N: usize>(all: [&str; N]) -> [String; N] {
@@ -227,7 +253,12 @@ fn pilot(pilot: &Pilot, all: &mut Contents) -> Result<()> {
     });
     let same = pilot.most_useful.iter().filter(|m| m.movement == m.paper);
     let words = json!({
+        "textures": pilot.textures.len(),
+        "movements": pilot.movements.len(),
         "trials": PILOT_TRIALS,
+        "most_n": pilot.movements.iter().map(|m| m.force_n).fold(0.0, f32::max).to_string(),
+        "usual_n": (f32::from(most_mn(false)) / 1e3).to_string(),
+        "useful": pilot.most_useful.len(),
         "same": same.count(),
         "missed": missed.collect::<Vec<_>>(),
     });
@@ -324,6 +355,10 @@ fn training(training: &Training, all: &mut Contents) -> Result<()> {
         .map(|t| format!("{} (CRC-32 {})", t.file, t.crc));
     let words = json!({
         "names": names.collect::<Vec<_>>(),
+        "movements": training.movements.len(),
+        "trials": TRIALS,
+        "matrices": training.confusion.len(),
+        "pairs": training.textures.len() * training.textures.len().saturating_sub(1) / 2,
         "slides": training.textures.len() * training.movements.len() * TRIALS as usize,
         "white": SHADES[0].to_string(),
         "black": SHADES[4].to_string(),
@@ -405,13 +440,14 @@ fn identification(identification: &Identification, all: &mut Contents) {
         row
     };
     let none: Paper<'_> = &|_| String::new();
-    let [correct, converged, wrong, median, mean] = words([
+    let [correct, converged, wrong, mean] = words([
         "correct identifications",
         "and converged",
         "wrong among the converged",
-        "median number of movements (11: more than half did not converge)",
         "mean number of movements",
     ]);
+    let beyond = MAX_SLIDES + 1;
+    let median = format!("median number of movements ({beyond}: more than half did not converge)");
     let tenth = |share: f64| format!("{share:.1}");
     let mut rows = vec![
         row(correct, &|p| tenth(p.correct), &|c| tenth(c.correct)),

@@ -134,7 +134,7 @@ impl Training {
             .collect();
         let (all, most_useful) = (geometric_mean(&all), geometric_mean(&most_useful));
         Ok(Self {
-            movements: movements.map(|m| (m.force_n(), m.speed_mm_s())).to_vec(),
+            movements: movements.map(|m| m.written()).to_vec(),
             correlations: (0..movements.len())
                 .map(|movement| Correlations {
                     ours: correlations(&textures, movement),

@@ -12,6 +12,13 @@ use crate::table::Against;
 /// Slides from which a reference is not one of few any more.
 pub const ENOUGH_TRIALS: u8 = 3;
 
+/// Score below which slides are of the only candidate, more probably than `threshold`: it is as likely as any other
+/// texture before the first slide.
+pub fn same_below(threshold: f32) -> f32 {
+    let p = threshold.clamp(0.5, 0.999_999);
+    -libm::logf(p / (1.0 - p))
+}
+
 impl<const N: usize> Explorer<'_, N> {
     /// As [`Explorer::verdict`]; where the question is whether it is the only candidate, once that is answered, or the
     /// last slide was made.
@@ -46,12 +53,9 @@ impl<const N: usize> Explorer<'_, N> {
             return None;
         }
         let limit = limits.limit(Against::Drifted, slides, self.config.false_alarm);
-        // as likely to be this one as any other before the first slide
-        let p = self.config.threshold.clamp(0.5, 0.999_999);
-        let same = score < -libm::logf(p / (1.0 - p));
         let answer = if score > limit {
             Answer::Different
-        } else if same {
+        } else if score < same_below(self.config.threshold) {
             Answer::Same
         } else {
             Answer::Unsure

@@ -164,9 +164,18 @@ impl Movement {
 
     /// Contact force in N and sliding speed in mm/s, as far as they are known.
     pub fn known(self) -> (Option<f32>, Option<f32>) {
-        let force = (self.force_mn != 0).then(|| self.force_n());
-        let speed = (self.speed_um_s != 0).then(|| self.speed_mm_s());
-        (force, speed)
+        let (force, speed) = self.written();
+        (
+            (self.force_mn != 0).then_some(force),
+            (self.speed_um_s != 0).then_some(speed),
+        )
+    }
+
+    /// Contact force in N and sliding speed in mm/s as people write them, 1.262 and not 1.2620001; 0 where one is
+    /// unknown.
+    pub fn written(self) -> (f32, f32) {
+        let (force, speed) = (f32::from(self.force_mn), self.speed_um_s as f32);
+        (force / 1e3, speed / 1e3)
     }
 
     /// Contact force in N; 0 where it is unknown.
@@ -297,6 +306,8 @@ mod tests {
                 close(force, force_n) && close(speed, speed_mm_s),
                 "{movement}"
             );
+            let numbers = Movement::partly(Some(1.262), Some(25.119)).map(Movement::written);
+            assert_eq!(numbers, Ok((1.262, 25.119)));
             assert_eq!(movement.is_known(), stored.0 != 0 && stored.1 != 0);
         }
         assert_eq!(Movement::stored(9, 0), Err(MovementError::Force(9)));

@@ -1,12 +1,14 @@
 //! Arguments that several commands take.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use tactus_core::explorer::Config;
 use tactus_core::features::FeatureSet;
 use tactus_core::table::{Drift, MAX_LENGTHS, is_false_alarm};
+use tactus_lab::data::recording::Labels;
+use tactus_lab::data::recordings::{RecordingError, RecordingSet};
 use tactus_lab::eval::evaluate::Method;
 
 use super::output::UsageError;
@@ -21,6 +23,46 @@ pub(crate) struct Recordings {
     /// Folder of recordings; that of TACTUS_RECORDINGS unless given
     #[arg(long, value_name = "DIR")]
     pub(crate) recordings: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) only: Only,
+}
+
+/// Which slides of a folder count.
+#[derive(Args, Clone, Default)]
+pub(crate) struct Only {
+    /// Take only slides of this lot, operator, session or run, such as lot=7; given again, all have to hold
+    #[arg(long, value_name = "COLUMN=VALUE", value_parser = label)]
+    pub(crate) only: Vec<(String, String)>,
+}
+
+impl Only {
+    pub(crate) fn is_all(&self) -> bool {
+        self.only.is_empty()
+    }
+
+    /// The selected slides of a folder.
+    pub(crate) fn open(&self, folder: &Path) -> Result<RecordingSet, RecordingError> {
+        let mut set = RecordingSet::open(folder)?;
+        if !self.is_all() {
+            set.select(&self.only)?;
+        }
+        Ok(set)
+    }
+}
+
+fn label(text: &str) -> Result<(String, String), String> {
+    let parts = text
+        .split_once('=')
+        .map(|(column, value)| (column.trim(), value.trim()));
+    match parts {
+        Some((column, value)) if Labels::SELECTING.contains(&column) => {
+            Ok((column.to_owned(), value.to_owned()))
+        }
+        _ => Err(format!(
+            "one of {} and a value, such as lot=7",
+            Labels::SELECTING.join(", ")
+        )),
+    }
 }
 
 impl Recordings {

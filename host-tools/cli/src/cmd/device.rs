@@ -36,7 +36,7 @@ Try first:
   tactus device log session.jsonl              the same decisions, computed again on this PC
 
 Ctrl-C stops the rig and waits until the finger is lifted; the exit code is 130 then.
-Where `identify` ends without a name that is sure, or `verify` not with \"the same\", it is 3.")]
+After `identify` and `verify` it is 3 for new, changed or different, and 4 for not sure.")]
 pub(crate) enum Command {
     Status(status::Args),
     Doctor(doctor::Args),

@@ -103,7 +103,7 @@ impl<'s> SlideFeatures<'s> {
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
-    let (set, measured) = measure_folder(&args.from.folder()?)?;
+    let (set, measured) = measure_folder(&args.from.folder()?, &args.from.only)?;
     if args.format == Rows::Npz {
         // as it is: what is printed has no bytes that do not print
         return Ok(std::io::stdout().write_all(&arrays(&set, &measured)?)?);

@@ -14,7 +14,6 @@ use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, expl
 use tactus_core::rig::Rig;
 use tactus_core::table::{MAX_TEXTURES, Table};
 use tactus_lab::data::quality::SlideMarks;
-use tactus_lab::data::recordings::RecordingSet;
 use tactus_lab::data::replay::{Replay, ReplayError};
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::{Experiment, Protocol};
@@ -28,7 +27,7 @@ use tactus_lab::sim::rig::SimRig;
 use tactus_study::pictures::exploration::Exploration;
 
 use super::args::{Expecting, Recordings, Stop};
-use super::output::{Done, Format, print_json};
+use super::output::{Done, Format, UsageError, print_json};
 use super::plot::{Canvas, Plot};
 use super::progress::{notice, with_progress};
 use super::table_file::read_table;
@@ -36,17 +35,17 @@ use super::textures::{find_material, find_textures, measure_folder, of_one_finge
 
 pub(crate) const FIRST_STEPS: &str = "\
 Try first:
-  tactus                                           a simulated probe recognises an unknown texture
-  tactus identify --simulated --texture burlap     another one
-With a folder of recordings, such as `tactus unpack` writes (there with --train-slides 2):
-  tactus identify --recordings DIR --material 91   a recorded texture is recognised from its slides
+  tactus                                           a simulated probe explores
+  tactus identify --simulated --texture burlap     another texture
+With recordings, such as those of `tactus unpack` (there with --train-slides 2):
+  tactus identify --recordings DIR --material 91   recognises a recorded texture
   tactus features --recordings DIR                 what every slide measures
-  tactus evaluate --recordings DIR                 how often the answers are right, and how sure
+  tactus evaluate --recordings DIR                 how often answers are right
 With a probe, or with the emulated board of `cargo xtask emulate --port 7429`:
   tactus device monitor                            what it measures, live
 
-Recordings of a real BioTac are at https://github.com/dexrob/BioTac_slide_20_50; `tactus import` reads
-them. `tactus simulate` makes others.";
+Recordings of a real BioTac: https://github.com/dexrob/BioTac_slide_20_50,
+which `tactus import` reads. `tactus simulate` makes others.";
 
 /// Recognise an unknown texture from its slides, and show every step
 #[derive(clap::Args)]
@@ -64,7 +63,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,
     /// The recorded texture to present as unknown: its number or its name
-    #[arg(long, value_name = "M", required_unless_present = "simulated")]
+    #[arg(long, value_name = "M")]
     material: Option<String>,
     /// Explore live on the simulated rig, in place of recordings
     #[arg(long, conflicts_with_all = ["recordings", "material", "table"])]
@@ -102,6 +101,12 @@ pub(crate) struct Args {
     plot: Plot,
 }
 
+const WHICH: &str = "\
+what is to be identified? Give one of these:
+  tactus identify --recordings DIR --material M   a recorded texture, by its number or name
+  tactus identify --simulated                     a texture under the simulated finger
+  tactus device identify                          what lies under the finger of a probe";
+
 #[derive(Serialize)]
 struct Identification {
     /// The presented texture.
@@ -136,10 +141,10 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     if args.simulated {
         return identify_simulated(args, None, canvas, out);
     }
-    let folder = args.from.folder()?;
-    let material = args.material.as_deref();
-    let material = material.context("--material")?;
-    identify_recorded(args, &folder, material, canvas, out)
+    let Some(material) = &args.material else {
+        return Err(UsageError(WHICH.to_owned()).into());
+    };
+    identify_recorded(args, &args.from.folder()?, material, canvas, out)
 }
 
 fn identify_recorded(
@@ -149,7 +154,7 @@ fn identify_recorded(
     canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<Done> {
-    let set = RecordingSet::open(folder)?;
+    let set = args.from.only.open(folder)?;
     let index = find_material(&set, material)?;
     let name = &set.textures()[index].name;
     let mut random = ChaCha8Rng::seed_from_u64(args.seed);
@@ -159,7 +164,7 @@ fn identify_recorded(
         Some(file) => Some((file, read_table(file, &mut given)?)),
         None => None,
     };
-    let (_, measured) = measure_folder(folder)?;
+    let (_, measured) = measure_folder(folder, &args.from.only)?;
     let mut shown = set.load_texture(index)?;
     let mut left_out = None;
     let table = if let Some((file, table)) = given {
@@ -229,16 +234,7 @@ fn identify_recorded(
         print_json(&found, out)?;
     }
     presented.draw(canvas, args, out)?;
-    Ok(found.done())
-}
-
-impl Identification {
-    fn done(&self) -> Done {
-        match self.verdict.told {
-            "sure" => Done::Fully,
-            _ => Done::NotIdentified,
-        }
-    }
+    Ok(Done::of(found.verdict.told))
 }
 
 /// The texture under the finger, and the exploration that is drawn.
@@ -439,7 +435,7 @@ fn identify_simulated(
             print_json(&found, out)?;
         }
         presented.draw(canvas.take(), args, out)?;
-        done = found.done();
+        done = Done::of(found.verdict.told);
     }
     Ok(done)
 }

@@ -99,7 +99,7 @@ fn recordings_of(args: &Args) -> anyhow::Result<PathBuf> {
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let folder = recordings_of(args)?;
-    let (set, mut measured) = measure_folder(&folder)?;
+    let (set, mut measured) = measure_folder(&folder, &args.from.only)?;
     if !args.lengths.is_empty() {
         // the first parts have few frames
         let slides = measured.iter_mut().flatten();

@@ -4,27 +4,28 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tactus_core::explorer::Answer;
+use tactus_lab::data::json;
 pub(crate) use tactus_lab::eval::show::percent;
 use tactus_lab::eval::verdicts::Verdicts;
-use tactus_lab::eval::verified::{self, Verified};
 
 /// The end of a command that did its work.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Done {
     /// With all that was asked for.
     Fully,
-    /// An exploration without a name that is sure.
-    NotIdentified,
+    /// The sample is another one, a new one, or has changed.
+    Different,
+    /// More slides would decide.
+    Unsure,
 }
 
 impl Done {
-    /// Fully, if the sample was found to be the same.
-    pub(crate) fn of(verified: &Verified) -> Self {
-        if verified.answer == verified::name(Answer::Same) {
-            Self::Fully
-        } else {
-            Self::NotIdentified
+    /// By the answer of a verification or the verdict of an exploration, in the words of their JSON.
+    pub(crate) fn of(answer: &str) -> Self {
+        match answer {
+            "same" | "sure" => Self::Fully,
+            "different" | "new" | "changed" => Self::Different,
+            _ => Self::Unsure,
         }
     }
 }
@@ -43,7 +44,7 @@ pub(crate) enum Format {
 }
 
 pub(crate) fn print_json(figures: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
-    writeln!(out, "{}", serde_json::to_string_pretty(figures)?)?;
+    writeln!(out, "{}", json::text(figures)?)?;
     Ok(())
 }
 

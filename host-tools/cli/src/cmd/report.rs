@@ -17,7 +17,7 @@ use tactus_lab::eval::show::count;
 use tactus_study::page::render;
 use tactus_study::pictures::map;
 
-use super::args::Recordings;
+use super::args::{Only, Recordings};
 use super::output::{Format, UsageError, percent, print_json, verdict_rows};
 use super::plot::Plot;
 use super::progress::{notice, progress};
@@ -30,6 +30,7 @@ use super::textures::{measure_folder, of_one_finger};
 Examples:
   tactus report TABLE                                        textures, nearest pairs, advice
   tactus report TABLE --recordings DIR --out report.html     and what users would be told, as a page
+  tactus report TABLE --recordings DIR --only lot=7          what users would be told of one lot
   tactus report --recordings DIR                             variance by part, operator and repetition
   tactus report --recordings ANNA --recordings BEN --plot charts    two operators, and control charts
   tactus device record cork felt --slides 5 --operator Anna --lot 7 --out ANNA
@@ -45,6 +46,8 @@ pub(crate) struct Args {
     /// table it may be given several times, for a study of several operators
     #[arg(long, value_name = "DIR")]
     recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    only: Only,
     /// Seed of the explorations
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -77,9 +80,15 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     }
     let mut folders = args.recordings.clone();
     if folders.is_empty() {
-        folders.push(Recordings { recordings: None }.folder()?);
+        folders.push(
+            Recordings {
+                recordings: None,
+                only: Only::default(),
+            }
+            .folder()?,
+        );
     }
-    repeatability::run(&folders, &args.plot, args.format, out)
+    repeatability::run(&folders, &args.only, &args.plot, args.format, out)
 }
 
 fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
@@ -95,7 +104,9 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
     let mut bytes = Vec::new();
     let table = read_table(file, &mut bytes)?;
     let folder = args.recordings.first();
-    let slides = folder.map(|folder| unseen(folder, table)).transpose()?;
+    let slides = folder
+        .map(|folder| unseen(folder, &args.only, table))
+        .transpose()?;
     let runs = slides
         .as_ref()
         .map_or(0, |(slides, _)| RUNS * slides.len() as u64);
@@ -139,8 +150,8 @@ fn command(file: &Path, args: &Args) -> String {
 }
 
 /// The slides of a folder that the table was not learned from, and what was left out.
-fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<(Vec<Slides>, LeftOut)> {
-    let (set, measured) = measure_folder(folder)?;
+fn unseen(folder: &Path, only: &Only, table: Table<'_>) -> anyhow::Result<(Vec<Slides>, LeftOut)> {
+    let (set, measured) = measure_folder(folder, only)?;
     of_one_finger(&set, table)?;
     let mut out = LeftOut::of(table, &mut Vec::new(), |slide: &MeasuredSlide| {
         slide.marks.clone()
@@ -153,21 +164,18 @@ fn unseen(folder: &Path, table: Table<'_>) -> anyhow::Result<(Vec<Slides>, LeftO
     Ok((slides.collect(), out))
 }
 
+/// Textures that are printed, most.
+const LISTED: usize = 20;
+
 fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result<()> {
     let wide = report.textures.iter().map(|t| t.name.chars().count()).max();
     let wide = wide.unwrap_or(0).max(7);
     writeln!(
         out,
-        "{}, {}\n\n{:<wide$}  {:>6}  {:<wide$} {:>12} {:>14}",
-        count(report.textures.len() as u64, "texture"),
-        count(report.table.movements.len() as u64, "movement"),
-        "texture",
-        "slides",
-        "nearest",
-        "taken for it",
-        "slides to tell"
+        "{}\n\n{:<wide$}  {:>6}  {:<wide$} {:>12} {:>14}",
+        report.verdict, "texture", "slides", "nearest", "taken for it", "slides to tell"
     )?;
-    for texture in &report.textures {
+    for texture in report.hardest().into_iter().take(LISTED) {
         let learned: u32 = texture.trials.iter().map(|&n| u32::from(n)).sum();
         let (nearest, taken, slides) = match &texture.nearest {
             Some(near) => (
@@ -181,6 +189,13 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
         writeln!(
             out,
             "{name:<wide$}  {learned:>6}  {nearest:<wide$} {taken:>12} {slides:>14}"
+        )?;
+    }
+    if let Some(more) = report.textures.len().checked_sub(LISTED + 1) {
+        let more = count(more as u64 + 1, "texture");
+        writeln!(
+            out,
+            "and {more} that are easier to tell: --out or --format json lists all"
         )?;
     }
     writeln!(out, "{samples}")?;

@@ -10,13 +10,15 @@ use tactus_lab::eval::show::count;
 use tactus_lab::sim::collection::{Collection, plain_name, texture_number};
 use tactus_world::textures::TEXTURES;
 
+use super::args::Only;
 use super::names::{listed, nearest, unknown};
 use super::progress::{notice, with_progress};
 
 pub(crate) fn measure_folder(
     folder: &Path,
+    only: &Only,
 ) -> anyhow::Result<(RecordingSet, Vec<Vec<MeasuredSlide>>)> {
-    let set = RecordingSet::open(folder)?;
+    let set = only.open(folder)?;
     set.sensor().with_context(|| folder.display().to_string())?;
     let textures = set.textures().len() as u64;
     let measured = with_progress(textures, "measuring slides", |done| {

@@ -16,12 +16,12 @@ use tactus_lab::eval::first::learn_first;
 use tactus_lab::eval::learn::Expected;
 use tactus_lab::eval::learned::LeftOut;
 use tactus_lab::eval::show::count;
-use tactus_lab::eval::verified::{Slide, Verified, name, print_answer, print_slide};
+use tactus_lab::eval::verified::{Slide, Verified, name, print_score, print_slide, sentence};
 use tactus_lab::eval::verify::{false_accept, put};
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_lab::sim::rig::{SimError, SimRig};
 
-use super::args::Stop;
+use super::args::{Only, Stop};
 use super::names::find;
 use super::output::{Done, Format, UsageError, print_json};
 use super::progress::with_progress;
@@ -39,12 +39,13 @@ Examples:
   tactus verify --reference DIR --texture cork --sample NEW                 the other textures of DIR give the scale
   tactus verify --table TABLE --texture cork --sample NEW --material cork   a texture of a table
   tactus verify --table TABLE --reference ROLL7 --sample ROLL8              one that the table does not have
+  tactus verify --reference DIR --texture cork --sample DIR --only lot=8    one lot against the others
   tactus verify --simulated --texture burlap                                live, with burlap under the simulated finger
   tactus verify --simulated --texture burlap --material marble              with something else
 
 Slides are taken in the order of time until it is the same, different, or none is left. It is different if fewer than
 --false-alarm of the reference's own slides would look so, and the same if that is more probable than --threshold.
-Exit code: 0 the same, 3 different or not sure.")]
+Exit code: 0 the same, 3 different, 4 not sure.")]
 pub(crate) struct Args {
     /// Recordings of the reference
     #[arg(long, value_name = "DIR", required_unless_present_any = ["table", "simulated"])]
@@ -55,9 +56,11 @@ pub(crate) struct Args {
     /// The table that gives the scale; without it, one is learned from all textures of the reference's recordings
     #[arg(long, value_name = "TABLE")]
     table: Option<PathBuf>,
-    /// Recordings of what is held against it
+    /// Recordings of what is held against it: with --only, these slides against the others of the same folder
     #[arg(long, value_name = "DIR", required_unless_present = "simulated")]
     sample: Option<PathBuf>,
+    #[command(flatten)]
+    only: Only,
     /// The texture of these recordings, where they have several; what lies under the simulated finger, the reference's
     /// unless given
     #[arg(long, value_name = "NAME")]
@@ -94,13 +97,16 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     };
     let reference_folder = args.reference.as_deref();
     let is_itself = reference_folder.is_some_and(|reference| same_folder(reference, folder));
-    ensure!(!is_itself || args.material.is_some(), ITSELF);
+    ensure!(
+        !is_itself || args.material.is_some() || !args.only.is_all(),
+        ITSELF
+    );
     // what is wrong with the question is said before what is wrong with the sample
     let of_table = match args.reference {
         Some(_) => None,
         None => Some(reference(args, folder, &[])?),
     };
-    let (set, mut measured) = measure_folder(folder)?;
+    let (set, mut measured) = measure_folder(folder, &args.only)?;
     let sample = one(&set, args.material.as_deref(), folder, "--material")?;
     let sample_name = set.textures()[sample].name.clone();
     let mut slides = measured.swap_remove(sample);
@@ -255,7 +261,7 @@ fn hold(
         Format::Json => print_json(&verified, out)?,
         Format::Text => print(&verified, out)?,
     }
-    Ok(Done::of(&verified))
+    Ok(Done::of(verified.answer))
 }
 
 /// The table, and its texture that `slides` of the folder `sample` are held against.
@@ -284,7 +290,7 @@ fn reference(
             .context("a name of the table is in the table")?;
         return Ok((table.as_bytes().to_vec(), texture));
     };
-    let (set, mut measured) = measure_folder(folder)?;
+    let (set, mut measured) = measure_folder(folder, &Only::default())?;
     let index = one(&set, args.texture.as_deref(), folder, "--texture")?;
     let name = &set.textures()[index].name;
     let is_same_folder = same_folder(folder, sample);
@@ -292,17 +298,26 @@ fn reference(
         .material
         .as_deref()
         .is_none_or(|m| find_material(&set, m).ok() == Some(index));
-    ensure!(!(is_same_folder && same_texture), ITSELF);
+    ensure!(
+        !(is_same_folder && same_texture) || !args.only.is_all(),
+        ITSELF
+    );
+    // neither the scale nor a part of the reference is learned from what is held against it
+    let held = SeenSlides::of(slides.iter().map(|slide| &slide.marks));
+    for (texture, measured) in measured.iter_mut().enumerate() {
+        let whole = texture == index && args.only.is_all();
+        measured.retain(|slide| whole || !held.has(&slide.marks));
+    }
+    ensure!(
+        !measured[index].is_empty(),
+        "{}: no slide of {name} is left for the reference",
+        folder.display()
+    );
     let bytes = match given {
         Some((file, table)) => of_one_finger(&set, table)
             .and_then(|()| Ok(put(table, name, &measured[index])?))
             .with_context(|| format!("{} with the reference", file.display()))?,
         None => {
-            // the scale is not learned from what is held against it
-            let held = SeenSlides::of(slides.iter().map(|slide| &slide.marks));
-            for (texture, measured) in measured.iter_mut().enumerate() {
-                measured.retain(|slide| texture == index || !held.has(&slide.marks));
-            }
             let textures = measured.iter().filter(|slides| !slides.is_empty()).count();
             ensure!(
                 textures > POPULATION,
@@ -355,19 +370,18 @@ fn one(
     }
 }
 
+/// Slides that are printed, most: the last ones.
+const PRINTED: usize = 20;
+
 fn print(v: &Verified, out: &mut impl Write) -> anyhow::Result<()> {
-    writeln!(
-        out,
-        "Is it {}? ({} of {})",
-        v.reference,
-        count(v.slides.len() as u64, "slide"),
-        v.sample.as_deref().unwrap_or("unknown")
-    )?;
+    let slides = count(v.slides.len() as u64, "slide");
+    let sample = v.sample.as_deref().unwrap_or("unknown");
+    writeln!(out, "{}\n\n{slides} of {sample}:", sentence(v))?;
+    for slide in v.slides.iter().skip(v.slides.len().saturating_sub(PRINTED)) {
+        print_slide(slide, out)?;
+    }
     if let Some(said) = v.left_out.and_then(|left_out| left_out.in_words()) {
         writeln!(out, "{said}")?;
     }
-    for slide in &v.slides {
-        print_slide(slide, out)?;
-    }
-    Ok(print_answer(v, out)?)
+    Ok(print_score(v, out)?)
 }

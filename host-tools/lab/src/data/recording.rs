@@ -99,6 +99,22 @@ pub struct Labels {
     pub calibrated: u32,
 }
 
+impl Labels {
+    /// Labels by which slides are selected.
+    pub const SELECTING: [&'static str; 4] = ["lot", "operator", "session", "run"];
+
+    /// The label of a column of [`SELECTING`](Self::SELECTING); empty for any other.
+    pub fn get(&self, column: &str) -> &str {
+        match column {
+            "lot" => &self.lot,
+            "operator" => &self.operator,
+            "session" => &self.session,
+            "run" => &self.run,
+            _ => "",
+        }
+    }
+}
+
 impl Recording {
     /// A recording from blocks, with P_DC beside them, of so many ms. Texture and number are left at 0. `None`: samples
     /// are missing.

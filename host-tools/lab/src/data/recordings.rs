@@ -12,7 +12,7 @@ pub mod npy;
 pub mod own;
 mod writer;
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -186,6 +186,41 @@ impl RecordingSet {
             slides,
             source,
         })
+    }
+
+    /// Leaves out the slides of a folder that do not have these labels, each a column and its value.
+    /// Errors: no slide has them.
+    pub fn select(&mut self, labels: &[(String, String)]) -> Result<()> {
+        let has = |of: &Labels, (column, value): &(String, String)| of.get(column) == value;
+        let is_one = |of: &Labels| labels.iter().all(|label| has(of, label));
+        if !self.slides.iter().flatten().any(|key| is_one(&key.labels)) {
+            let of = |(column, value): &(String, String)| {
+                let there = self
+                    .slides
+                    .iter()
+                    .flatten()
+                    .map(|key| key.labels.get(column));
+                let there: BTreeSet<&str> = there.filter(|value| !value.is_empty()).collect();
+                let there = there.into_iter().collect::<Vec<_>>().join(", ");
+                let there = if there.is_empty() {
+                    "none is named"
+                } else {
+                    &there
+                };
+                format!("{column}={value} ({there})")
+            };
+            let of: Vec<String> = labels.iter().map(of).collect();
+            let cause = format!(
+                "no slide has {}; in brackets is what there is",
+                of.join(" and ")
+            );
+            return Err(RecordingError::at(&self.folder, cause));
+        }
+        if let Source::Own(manifest) = &mut self.source {
+            manifest.retain(is_one);
+            (self.textures, self.slides) = manifest.contents();
+        }
+        Ok(())
     }
 
     /// The folder that was opened.

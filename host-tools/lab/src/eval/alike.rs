@@ -45,8 +45,8 @@ pub fn alike(table: Table<'_>, texture: u16, other: u16) -> Option<Alike> {
     Some(Alike {
         texture: table.name(other)?.to_owned(),
         taken_for: normal_below(deviation),
-        force_n: movement.force_n(),
-        speed_mm_s: movement.speed_mm_s(),
+        force_n: movement.written().0,
+        speed_mm_s: movement.written().1,
         slides,
         feels_the_same: slides.is_none(),
     })

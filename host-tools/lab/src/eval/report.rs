@@ -1,5 +1,7 @@
 //! Quality of a table: the separation of its textures, the verdicts on recorded slides, and advice.
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{self, Config, ENOUGH_TRIALS};
@@ -12,7 +14,7 @@ use crate::eval::evaluate::{EvaluateError, Method, explorer, play};
 use crate::eval::experiment::Experiment;
 use crate::eval::learned::LeftOut;
 use crate::eval::samples;
-use crate::eval::show::count;
+use crate::eval::show::{count, percent};
 use crate::eval::table_summary::TableSummary;
 use crate::eval::verdicts::Verdicts;
 
@@ -29,6 +31,8 @@ const WIDE: f64 = 1.5;
 /// A table, and its quality.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Report {
+    /// All of it in a sentence.
+    pub verdict: String,
     /// Its contents.
     pub table: TableSummary,
     /// The textures, in the order of the table.
@@ -62,7 +66,7 @@ pub struct Pair {
     /// The touched texture ...
     pub texture: String,
     /// ... and the one it is taken for.
-    #[serde(flatten)]
+    #[serde(rename = "nearest")]
     pub other: Alike,
 }
 
@@ -141,6 +145,7 @@ impl Report {
             recorded: None,
         });
         let mut report = Self {
+            verdict: String::new(),
             table: TableSummary::new(table),
             textures: textures.collect(),
             pairs: pairs(table),
@@ -151,7 +156,41 @@ impl Report {
             report.play(table, slides, seed, done)?;
         }
         report.advice = advice(&report);
+        report.verdict = report.sentence();
         Ok(report)
+    }
+
+    fn sentence(&self) -> String {
+        let nearest = || self.textures.iter().filter_map(|t| t.nearest.as_ref());
+        let all = count(self.textures.len() as u64, "texture");
+        let same = nearest().filter(|near| near.slides.is_none()).count();
+        let most = nearest().filter_map(|near| near.slides).max();
+        let most = most.map(|n| count(n, "slide"));
+        let apart = match (same, most) {
+            (0, None) => format!("{all}, and nothing to tell it from"),
+            (0, Some(most)) => format!("All {all} are told apart by {most} at most"),
+            (same, None) => format!("Ten slides do not tell {same} of {all} from the nearest one"),
+            (same, Some(most)) => format!(
+                "Ten slides do not tell {same} of {all} from the nearest one; the others take {most} at most"
+            ),
+        };
+        let share = |share: f64| percent((1000.0 * share).round() / 1000.0);
+        let told = self.recorded.as_ref().map(|recorded| {
+            let (right, wrong) = (share(recorded.known.right), share(recorded.known.wrong));
+            format!("; recorded slides get the right name in {right}, a wrong one in {wrong}")
+        });
+        format!("{apart}{}.", told.unwrap_or_default())
+    }
+
+    /// The textures that are hardest to tell from their nearest, the hardest first.
+    pub fn hardest(&self) -> Vec<&TextureReport> {
+        let mut all: Vec<&TextureReport> = self.textures.iter().collect();
+        let ease = |t: &&TextureReport| {
+            let near = t.nearest.as_ref()?;
+            Some((near.slides.map_or(u8::MAX, Into::into), near.taken_for))
+        };
+        all.sort_by(|a, b| ease(b).partial_cmp(&ease(a)).unwrap_or(Ordering::Equal));
+        all
     }
 
     /// Notes the slides that were left out of the recordings.
@@ -318,29 +357,47 @@ fn scatter(table: Table<'_>, texture: u16, slides: &[Vec<Observation>]) -> Optio
     (features > 0.0).then(|| ((within / freedoms).sqrt(), (away / features).sqrt()))
 }
 
-/// Advice for the table's user.
-fn advice(report: &Report) -> Vec<String> {
+/// Advice for textures that are taken for each other.
+fn of_pairs(report: &Report) -> Vec<String> {
     let mut advice = Vec::new();
-    let mut told: Vec<(&str, &str)> = Vec::new();
-    for Pair { texture, other } in &report.pairs {
-        let (a, b) = (texture.as_str(), other.texture.as_str());
-        if told.contains(&(b, a)) {
-            continue;
-        }
-        told.push((a, b));
-        let share = format!("{:.0} %", 100.0 * other.taken_for);
-        match other.slides {
-            None => advice.push(format!(
-                "{a} and {b} cannot be told apart with these movements: {share} of the slides of {a} would be taken \
-                 for {b}, and ten slides do not settle it. Give them one name, or learn them at another movement."
-            )),
-            Some(n @ 4..) => advice.push(format!(
-                "{a} and {b} take about {} to tell apart; more trials of both would help.",
-                count(n, "slide")
-            )),
-            Some(_) => {}
+    let mut pairs: Vec<&Pair> = Vec::new();
+    for pair in &report.pairs {
+        let is_other =
+            |o: &&Pair| (&o.texture, &o.other.texture) == (&pair.other.texture, &pair.texture);
+        if !pairs.iter().any(is_other) {
+            pairs.push(pair);
         }
     }
+    let listed = |is_one: fn(&Alike) -> bool, says: &dyn Fn(&Alike) -> String| {
+        let these = pairs.iter().filter(|pair| is_one(&pair.other));
+        let these = these.map(|Pair { texture, other }| {
+            format!("{texture} and {} ({})", other.texture, says(other))
+        });
+        these.collect::<Vec<_>>().join(", ")
+    };
+    let same = listed(|other| other.slides.is_none(), &|other| {
+        format!("{:.0} % taken for it", 100.0 * other.taken_for)
+    });
+    if !same.is_empty() {
+        advice.push(format!(
+            "Pairs that cannot be told apart with these movements, not by ten slides: {same}. Give each pair one \
+             name, or learn it at another movement."
+        ));
+    }
+    let slow = listed(|other| other.slides >= Some(4), &|other| {
+        count(other.slides.unwrap_or_default(), "slide")
+    });
+    if !slow.is_empty() {
+        advice.push(format!(
+            "Pairs that take long to tell apart: {slow}. More trials of both would help."
+        ));
+    }
+    advice
+}
+
+/// Advice for the table's user.
+fn advice(report: &Report) -> Vec<String> {
+    let mut advice = of_pairs(report);
     for few in 0..ENOUGH_TRIALS {
         let fewest = |t: &&TextureReport| t.trials.iter().min() == Some(&few);
         let names = report
@@ -361,23 +418,26 @@ fn advice(report: &Report) -> Vec<String> {
     let stayed = report.textures.iter().filter(at_one_spot);
     let stayed: Vec<&str> = stayed.map(|t| t.name.as_str()).collect();
     advice.extend(samples::advice(&stayed));
-    for texture in &report.textures {
-        let name = &texture.name;
-        let Some(recorded) = texture.recorded else {
-            continue;
-        };
-        if let Some(moved) = recorded.moved.filter(|moved| *moved > MOVED) {
-            advice.push(format!(
-                "{name} is not as it was learned: the mean of its recorded slides is off by {moved:.1} times what \
-                 chance explains. If finger or sample changed, learn it again."
-            ));
-        }
-        if let Some(spread) = recorded.spread.filter(|spread| *spread > WIDE) {
-            advice.push(format!(
-                "Slides of {name} scatter {spread:.1} times as much as the table expects: it may differ from place to \
-                 place. Learn it from more places of the sample."
-            ));
-        }
+    let beyond = |of: fn(&RecordedTexture) -> Option<f64>, most: f64| {
+        let these = report.textures.iter().filter_map(|texture| {
+            let value = of(texture.recorded.as_ref()?).filter(|value| *value > most)?;
+            Some(format!("{} ({value:.1} times)", texture.name))
+        });
+        these.collect::<Vec<_>>().join(", ")
+    };
+    let moved = beyond(|recorded| recorded.moved, MOVED);
+    if !moved.is_empty() {
+        advice.push(format!(
+            "Not as learned, their means off by so many times what chance explains: {moved}. If finger or sample \
+             changed, learn these again."
+        ));
+    }
+    let wide = beyond(|recorded| recorded.spread, WIDE);
+    if !wide.is_empty() {
+        advice.push(format!(
+            "Slides scatter more than the table expects: {wide}. They may differ from place to place: learn from more \
+             places of the sample."
+        ));
     }
     if report.table.movements.len() == 1 && report.table.textures.len() > 1 {
         advice.push(

@@ -425,14 +425,14 @@ fn show_whitened(table: Table<'_>, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "\nmovement {}: {movement}", index + 1)?;
         writeln!(
             out,
-            "{:>4} {:<24} {:>6}  {:>7} {:>4} {:>6}  {:>6}  most like",
-            "no.", "texture", "trials", "factory", "user", "itself", "sd off"
+            "{:>4} {:<24} {:>6}  {:>7} {:>6} {:>6}  {:>6}  most like",
+            "no.", "texture", "trials", "learned", "taught", "itself", "sd off"
         )?;
         for (number, texture) in (1..).zip(&textures) {
             let (name, known) = (&texture.name, &texture.movements[index]);
             write!(
                 out,
-                "{number:>4} {name:<24} {:>6}  {:>7} {:>4} {:>6}",
+                "{number:>4} {name:<24} {:>6}  {:>7} {:>6} {:>6}",
                 known.trials, texture.slides_factory, texture.slides_user, texture.slides_itself
             )?;
             match known.nearest_sd.zip(known.nearest.as_ref()) {

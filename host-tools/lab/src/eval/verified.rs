@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS};
+use tactus_core::explorer::{Answer, Config, ENOUGH_TRIALS, same_below};
 use tactus_core::table::Table;
 use tactus_core::wire::Failure;
 
@@ -27,6 +27,8 @@ pub struct Verified {
     pub false_alarm: f32,
     /// Least probability of "the same".
     pub threshold: f32,
+    /// The score below which they are the same, where that is below the limit.
+    pub same_below: f32,
     /// Share of other textures' episodes of as many slides that would be called the same; `null`: the table has no
     /// other.
     pub false_accept: Option<f64>,
@@ -57,6 +59,7 @@ impl Verified {
             few: reference_slides < ENOUGH_TRIALS,
             false_alarm: config.false_alarm.unwrap_or(limits.false_alarm),
             threshold: config.threshold,
+            same_below: same_below(config.threshold),
             false_accept: None,
             left_out: None,
             slides: Vec::new(),
@@ -110,32 +113,52 @@ pub fn print_slide(slide: &Slide, out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// Prints the answer, and its error rates.
+/// The answer in a sentence.
+pub fn sentence(v: &Verified) -> String {
+    let reference = &v.reference;
+    match v.answer {
+        "same" => format!("The same as {reference}."),
+        "different" => {
+            format!("Different from {reference}, or {reference} has changed more than expected.")
+        }
+        _ => format!("Not sure yet whether it is {reference}: more slides would decide."),
+    }
+}
+
+/// Prints the answer, and what its score means.
 pub fn print_answer(v: &Verified, out: &mut impl Write) -> io::Result<()> {
-    let answer = match v.answer {
-        "same" => format!("The same as {}.", v.reference),
-        "different" => format!(
-            "Different from {}, or {0} has changed more than expected.",
-            v.reference
-        ),
-        _ => format!(
-            "Not sure yet whether it is {}: more slides would decide.",
-            v.reference
-        ),
-    };
-    writeln!(out, "{answer}")?;
-    let accepted = match v.false_accept {
-        Some(share) => format!(
-            "; of the table's other textures {} would be called the same",
-            percent((share * 1000.0).round() / 1000.0)
-        ),
-        None => String::new(),
-    };
-    writeln!(
-        out,
-        "At this limit {} of its own slides would be called different{accepted}.",
-        percent(v.false_alarm.into())
-    )?;
+    writeln!(out, "{}", sentence(v))?;
+    print_score(v, out)
+}
+
+/// Prints what the last score means, and how often its limits are wrong.
+pub fn print_score(v: &Verified, out: &mut impl Write) -> io::Result<()> {
+    let reference = &v.reference;
+    if let Some(Slide { score, limit, .. }) = v.slides.last() {
+        let times = match f64::from(score.abs()).exp() {
+            times if times > 1e6 => "over a million".to_owned(),
+            times if times < 10.0 => format!("{times:.1}"),
+            times => {
+                let digit = 10_f64.powi(times.log10() as i32 - 1);
+                format!("{:.0}", (times / digit).round() * digit)
+            }
+        };
+        let (better, worse) = match *score > 0.0 {
+            true => ("another texture", &reference[..]),
+            false => (&reference[..], "another texture"),
+        };
+        let accepted = v.false_accept.map_or(String::new(), |share| {
+            let share = percent((share * 1000.0).round() / 1000.0);
+            format!(" ({share} of the table's other textures would be)")
+        });
+        writeln!(
+            out,
+            "Score {score:.1}: {better} explains the slides {times} times as well as {worse} does. Above {limit:.1} \
+             they are different ({} of {reference}'s own would be), below {:.1} the same{accepted}.",
+            percent(v.false_alarm.into()),
+            v.same_below.min(*limit)
+        )?;
+    }
     if v.few {
         writeln!(
             out,

@@ -224,8 +224,8 @@ impl Measured {
         let of = |property| slide.properties.get(property);
         let bands = slide.bands.iter();
         Self {
-            force_n: movement.force_n(),
-            speed_mm_s: movement.speed_mm_s(),
+            force_n: movement.written().0,
+            speed_mm_s: movement.written().1,
             traction_n: of(Property::Traction),
             roughness_ln: of(Property::Roughness),
             fineness_ln: of(Property::Fineness),

@@ -64,10 +64,7 @@ impl ProbeMonitor {
         self.known = KnownTable {
             textures: table.names().map(str::to_owned).collect(),
             numbers: table.names().map(texture_number).collect(),
-            movements: table
-                .movements()
-                .map(|m| (m.force_n(), m.speed_mm_s()))
-                .collect(),
+            movements: table.movements().map(|m| m.written()).collect(),
             lengths_ms: table.lengths_ms().collect(),
             maps: self.planes.iter().map(|p| p.places.clone()).collect(),
             bytes: bytes.len(),

@@ -74,8 +74,10 @@ impl Grid<'_> {
                 for (c, name) in columns.iter().enumerate() {
                     let at = ((column(c) + column(c + 1)) / 2, under + 12);
                     // the last ones are no numbers, and have room at their sides
+                    let is_word = name.parse::<f64>().is_err() && width(name, EM) <= room;
+                    let is_last = c + 1 == columns.len();
                     let is_shown =
-                        c % every == 0 && c + every <= columns.len() || c + 1 == columns.len();
+                        is_word || is_last || c % every == 0 && c + every <= columns.len();
                     if is_shown {
                         write(root, name, at, From::Middle, BLACK)?;
                     }
@@ -121,3 +123,28 @@ impl Grid<'_> {
 
 /// Colour of a cell that is to be left out of account.
 pub(crate) const AVOIDED: RGBColor = GREY;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_that_are_no_numbers_have_their_names() {
+        let columns = (1..=20)
+            .map(|n| n.to_string())
+            .chain(["N", "?"].map(str::to_owned));
+        let grid = Grid {
+            id: "grid".to_owned(),
+            title: "Grid".to_owned(),
+            about: "",
+            x: ("x", columns.collect()),
+            y: ("y", vec!["row".to_owned()]),
+            tiles: Vec::new(),
+            below: "",
+        };
+        let svg = grid.figure().unwrap().svg;
+        for (name, is_shown) in [("1", true), ("2", false), ("N", true), ("?", true)] {
+            assert_eq!(svg.contains(&format!(">\n{name}\n<")), is_shown, "{name}");
+        }
+    }
+}

@@ -58,7 +58,7 @@ impl Explored {
     /// The result of a command; one without a line of JSON has failed, and says why at its end.
     fn by(command: &mut Command) -> Self {
         let (stdout, said) = match command.output() {
-            Ok(output) if matches!(output.status.code(), Some(0 | 3)) => {
+            Ok(output) if matches!(output.status.code(), Some(0 | 3 | 4)) => {
                 let text = String::from_utf8_lossy(&output.stdout).into_owned();
                 (text, "it prints no line of JSON".to_owned())
             }

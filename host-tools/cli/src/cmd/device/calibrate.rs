@@ -16,11 +16,9 @@ use crate::cmd::output::Format;
 Examples:
   tactus device calibrate                   measures the motor's current without load, and P_DC in the air
   tactus device calibrate --drifted         if a finger in the air seems to touch something: takes its P_DC anew
-  tactus device calibrate --weights 30g,60g,90g,120g,150g
-                                            asks for these weights on the lifted finger
+  tactus device calibrate --weights 30g,60g,90g,120g,150g   asks for these on the finger
   tactus device calibrate --turn-over       only asks for a finger with an accelerometer to be turned over
-  tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4
-                                            also takes what was measured on an incline and on a scale
+  tactus device calibrate --newton-per-ampere 16.2 --force-mn-per-count 11.4   as measured on incline and scale
 
 `tactus device status` shows what is in use. What a count of P_DC is worth in mN has a day only once it was
 measured: with --weights, or with --force-mn-per-count. Until then it is the paper's, of another finger.")]

@@ -32,7 +32,7 @@ const CHIP: &str = "STM32F429ZITx";
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     ensure!(
-        args.dry_run || args.elf.is_file(),
+        args.elf.is_file(),
         "{}: no such file; `cargo xtask size` builds the firmware and names it",
         args.elf.display()
     );

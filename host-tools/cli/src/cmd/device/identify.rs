@@ -4,7 +4,6 @@ use std::io::Write;
 
 use anyhow::Context as _;
 use serde::Serialize;
-use tactus_core::explorer::VerdictKind;
 use tactus_core::table::Table;
 use tactus_core::wire::{Identify, Status};
 use tactus_lab::eval::evaluate::Method;
@@ -25,7 +24,7 @@ use crate::cmd::plot::Plot;
 #[command(after_help = "\
 Examples:
   tactus device identify --log session.jsonl          every report is kept, and can be computed again
-  tactus device identify --among burlap,silk --closed it is one of these two
+  tactus device identify --among burlap,silk --closed   it is one of these two
   tactus device identify --plot pictures              as `tactus identify` draws them")]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -129,6 +128,8 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
         }
     });
     let (identified, answered) = bench.done(identified, out)?;
+    let verdict = answered.map(|(verdict, slides)| Answer::new(verdict, slides, table));
+    let told = verdict.as_ref().map(|verdict| verdict.told);
     if *format == Format::Json {
         let (frames_damaged, reports_lost) = probe.losses();
         let identification = Identification {
@@ -137,7 +138,7 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
             max_slides: args.stop.max_slides,
             seed,
             slides,
-            verdict: answered.map(|(verdict, slides)| Answer::new(verdict, slides, table)),
+            verdict,
             learned_slides: identified.learned,
             frames_damaged,
             reports_lost,
@@ -148,8 +149,5 @@ pub(crate) fn run(run: &Run, out: &mut impl Write) -> anyhow::Result<Done> {
         let figures = exploration.figures(args.stop.threshold)?;
         canvas.write(&figures, out)?;
     }
-    Ok(match answered.map(|(verdict, _)| verdict.kind()) {
-        Some(VerdictKind::Sure) => Done::Fully,
-        _ => Done::NotIdentified,
-    })
+    Ok(told.map_or(Done::Unsure, Done::of))
 }

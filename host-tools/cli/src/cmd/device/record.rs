@@ -25,7 +25,7 @@ Examples:
   tactus evaluate --recordings recordings
   tactus device record burlap silk --out anna --operator Anna --lot 7     for tactus report
   tactus device record burlap silk --out turned --moved     on a turntable; the table learned from it says so
-  tactus device record burlap silk --out there --same-spot  without asking to move the sample
+  tactus device record burlap silk --out there --same-spot   without asking to move the sample
 A slide on the same track again says little about a texture. So at a terminal the rig stops after each slide of all
 movements of the probe's table, its finger lifted, and you are asked to move or turn the sample. What came of that
 stands beside each slide. The same command goes on with the texture at which an interrupted one stopped.")]

@@ -87,9 +87,8 @@ Examples:
   tactus device settings                        what is set
   tactus device settings --false-alarm 0.005    of known textures, one in 200 may be called new
   tactus device settings --as-table             what the table was learned for, 2 % unless `learn` was told otherwise
-  tactus device settings --high-force on
-        a rig may press with 2 N, if its finger yields or its lever is stopped before 2.2 N
-  tactus device settings --high-force off       1.26 N again
+  tactus device settings --high-force on         2 N, if the finger yields or the lever is stopped before 2.2 N
+  tactus device settings --high-force off        1.26 N again
 
 The probe keeps both without power. The share of false alarms holds for the person at a handheld and for `identify`,
 `monitor` and `verify`, where these are not given a --false-alarm of their own. A handheld refuses --high-force: a

@@ -22,7 +22,7 @@ Examples:
   tactus device verify cork --false-alarm 0.005    of its own slides, one in 200 may be called different
 
 The probe slides until it is sure, --max-slides at most. Its go / no-go output is high from the answer \"the same\"
-until the next `verify` begins. Exit code: 0 the same, 3 different or not sure.")]
+until the next `verify` begins. Exit code: 0 the same, 3 different, 4 not sure.")]
 pub(crate) struct Args {
     #[command(flatten)]
     at: Where,
@@ -57,5 +57,5 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     if args.format == Format::Json {
         print_json(&verified, out)?;
     }
-    Ok(Done::of(&verified))
+    Ok(Done::of(verified.answer))
 }

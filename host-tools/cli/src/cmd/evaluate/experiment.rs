@@ -12,7 +12,7 @@ use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::learn::Expected;
 use tactus_study::fabricslide::FabricSet;
 
-use crate::cmd::args::{Expecting, Features, Recordings, Stop};
+use crate::cmd::args::{Expecting, Features, Only, Recordings, Stop};
 use crate::cmd::output::Format;
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
@@ -169,8 +169,11 @@ pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
         (experiment, "properties")
     } else {
         let folder = args.from.folder()?;
-        let (set, measured) = measure_folder(&folder)?;
-        let test = args.test.as_deref().map(measure_folder).transpose()?;
+        let (set, measured) = measure_folder(&folder, &args.from.only)?;
+        let test = args.test.as_deref();
+        let test = test
+            .map(|test| measure_folder(test, &Only::default()))
+            .transpose()?;
         if let Some((test, _)) = &test {
             let gain = |of: &Path| anyhow::Ok(Settings::default().with_file(of)?.gain);
             if let (Some(here), Some(there)) = (gain(&folder)?, gain(test.folder())?) {

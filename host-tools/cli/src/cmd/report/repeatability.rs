@@ -12,6 +12,7 @@ use tactus_lab::eval::show::count;
 use tactus_study::chart::Figure;
 use tactus_study::pictures::control;
 
+use crate::cmd::args::Only;
 use crate::cmd::output::{Format, UsageError, percent, print_json};
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
@@ -55,6 +56,7 @@ struct Taken {
 
 pub(super) fn run(
     folders: &[PathBuf],
+    only: &Only,
     plot: &Plot,
     format: Format,
     out: &mut impl Write,
@@ -69,7 +71,7 @@ pub(super) fn run(
             );
             return Err(UsageError(say).into());
         }
-        take(folder, &mut slides)?;
+        take(folder, only, &mut slides)?;
     }
     let gauged = gauge(&slides)?;
     match format {
@@ -100,8 +102,8 @@ fn charts(gauged: &Gauged) -> anyhow::Result<Vec<Figure>> {
     Ok(figures)
 }
 
-fn take(folder: &Path, slides: &mut Vec<Taken>) -> anyhow::Result<()> {
-    let (set, measured) = measure_folder(folder)?;
+fn take(folder: &Path, only: &Only, slides: &mut Vec<Taken>) -> anyhow::Result<()> {
+    let (set, measured) = measure_folder(folder, only)?;
     for (index, (texture, measured)) in set.textures().iter().zip(&measured).enumerate() {
         for (slide, key) in measured.iter().zip(set.slides(index)) {
             let labels = key.labels.clone();

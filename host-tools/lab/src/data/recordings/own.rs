@@ -173,6 +173,14 @@ impl Manifest {
         Ok(Self { textures })
     }
 
+    /// Keeps the slides of these labels.
+    pub(super) fn retain(&mut self, is_one: impl Fn(&Labels) -> bool) {
+        for (_, entries) in &mut self.textures {
+            entries.retain(|entry| is_one(&entry.labels));
+        }
+        self.textures.retain(|(_, entries)| !entries.is_empty());
+    }
+
     pub(super) fn contents(&self) -> (Vec<Texture>, Vec<Vec<SlideKey>>) {
         let key = |e: &Entry| SlideKey {
             number: e.number,
