@@ -3,7 +3,6 @@
 mod arm;
 mod crush;
 mod early;
-mod fabricslide;
 mod fault_cases;
 mod faults;
 mod figures;
