@@ -6,6 +6,7 @@
 
 mod message;
 mod monitor;
+mod places;
 mod scene;
 mod session;
 mod slides;

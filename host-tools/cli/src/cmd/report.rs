@@ -15,7 +15,6 @@ use tactus_lab::eval::report::{RUNS, Report, Slides};
 use tactus_lab::eval::samples;
 use tactus_lab::eval::show::count;
 use tactus_study::page::render;
-use tactus_study::pictures::map;
 
 use super::args::Recordings;
 use super::output::{Format, UsageError, percent, print_json, verdict_rows};
@@ -68,7 +67,6 @@ struct Page<'r> {
     report: &'r Report,
     /// Its own figures in a sentence.
     figures: Option<String>,
-    map: String,
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
@@ -114,7 +112,6 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
             command: command(file, args),
             report: &report,
             figures: report.table.open_set.as_ref().map(open_set::in_words),
-            map: map::figure(table)?.svg,
         };
         let page = render(include_str!("report/page.html"), &page)?;
         write_file(path, page.as_bytes(), args.force)?;
