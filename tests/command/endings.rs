@@ -16,7 +16,8 @@ fn left() -> Stdio {
     writer.into()
 }
 
-const DIFFERENT: &str = "verify --simulated --among 4 --texture burlap --material marble";
+const DIFFERENT: &str =
+    "verify --reference SIMULATED --texture burlap --sample SIMULATED --material corduroy";
 
 #[test]
 fn a_reader_that_leaves_ends_the_printing_and_not_the_verdict() {
