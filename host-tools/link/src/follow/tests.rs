@@ -287,22 +287,13 @@ fn a_missing_report_is_said_and_the_rest_followed() {
         follow(&events)
     };
     let (agreement, errors) = without(place(40, |t| matches!(t, Event::Block(_))));
-    let missing = FollowError::MissingBlock {
-        slide: 1,
-        expected: 40,
-        got: 41,
-    };
-    assert_eq!(errors, [missing]);
+    let says = |error: &FollowError, part| assert!(error.0.starts_with(part), "{error}");
+    assert_eq!(errors.len(), 1);
+    says(&errors[0], "slide 1: block 40 is missing, block 41 came");
     assert_eq!((agreement.slides, agreement.posteriors), (3, 4));
     // a report of a slide is lost: nothing after it can be compared
     let (agreement, errors) = without(place(1, |t| matches!(t, Event::SlideReport { .. })));
-    assert_eq!(
-        errors[0],
-        FollowError::Order {
-            expected: 2,
-            got: 3
-        }
-    );
+    says(&errors[0], "slide 3 came where slide 2 was due");
     assert_eq!(agreement.posteriors, 1);
     // streaming was off
     let silent: Vec<Event> = explored().1.clone();
@@ -311,10 +302,8 @@ fn a_missing_report_is_said_and_the_rest_followed() {
         .filter(|t| !matches!(t, Event::Block(_)))
         .collect();
     let (agreement, errors) = follow(&silent);
-    assert_eq!(
-        errors,
-        (1..=4).map(FollowError::NoBlocks).collect::<Vec<_>>()
-    );
+    assert_eq!(errors.len(), 4);
+    says(&errors[3], "slide 4: no samples came");
     assert!(agreement.slides == 0 && !agreement.agrees());
 }
 
