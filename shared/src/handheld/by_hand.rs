@@ -7,7 +7,7 @@ use super::jobs::{Outcome, work};
 use super::judge::MOVEMENT;
 use super::screen::{About, Screen};
 use super::speed::Moved;
-use super::states::{Answer, Handheld, Job, RequestedSlide, TICKS_HZ};
+use super::states::{Answer, Handheld, RequestedSlide, TICKS_HZ};
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, Watch};

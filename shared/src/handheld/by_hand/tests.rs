@@ -2,13 +2,9 @@
 
 use super::*;
 use crate::dsp::Plan;
-use crate::probe::Memory;
 use crate::probe::explore::Random;
 use crate::rig::weigh::ForceScale;
-use crate::sensor::FingerCode;
 use crate::sensor::pressure::{Calibration, Channel, Counts};
-use crate::store::Store;
-use crate::store::tests::ram::{Ram, SECTOR};
 use crate::wire::Again;
 use embassy_futures::block_on;
 use std::string::{String, ToString as _};
