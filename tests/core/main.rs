@@ -10,7 +10,6 @@ mod fixed_point;
 mod formats;
 mod fused_recipe;
 mod golden;
-mod half_words;
 mod high_force;
 mod oracle;
 mod pace;
