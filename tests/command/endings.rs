@@ -16,8 +16,7 @@ fn left() -> Stdio {
     writer.into()
 }
 
-const DIFFERENT: &str =
-    "verify --reference SIMULATED --texture burlap --sample SIMULATED --material corduroy";
+const DIFFERENT: &str = "verify --simulated --among 4 --texture burlap --material marble";
 
 #[test]
 fn a_reader_that_leaves_ends_the_printing_and_not_the_verdict() {

@@ -1,8 +1,8 @@
-//! What users are told: `identify` and `evaluate` agree.
+//! What users are told: `identify` and `evaluate` agree, and `verify` is right as often as it says.
 
 use tactus_tests::{count, data};
 
-use crate::Scratch;
+use crate::{Scratch, array};
 
 /// Names of the verdicts.
 const VERDICTS: [&str; 5] = ["right", "new", "wrong", "most_like", "undecided"];
@@ -123,4 +123,37 @@ fn identifications_in_the_simulated_world_agree_with_evaluate() {
     let at = Scratch::new().with("FOLDER", "slides");
     at.printed("simulate --textures 12,13,14,15,16,47,60,90 --trials 7 --out slides");
     compare(&at, 3, "paper", "--max-slides 1", count(25, 6));
+}
+
+/// Worlds with a texture under the simulated finger against itself, and against another that the probe knows or does
+/// not.
+#[test]
+fn live_slides_are_verified_as_often_right_as_it_says() {
+    let at = Scratch::new();
+    let (mut rejected, mut stated, mut unsure) = (0, 0.0, 0);
+    for seed in 1..=count(20, 3) {
+        let reference = 1 + seed * 29 % 117;
+        let other = 1 + (seed * 29 + 7 * seed + 3) % 117;
+        for under in [reference, other] {
+            let verify =
+                format!("verify --simulated --among 5 --seed {seed} --texture {reference}");
+            let ran = at.run(&format!("{verify} --material {under} --format json"));
+            let told: serde_json::Value = serde_json::from_str(&ran.out).expect(&ran.said);
+            let (answer, slides) = (&told["answer"], array(&told["slides"]).len());
+            println!("world {seed}: {under} against {reference}: {answer} after {slides}");
+            if under == reference {
+                stated += told["false_alarm"].as_f64().unwrap();
+                rejected += i32::from(answer == "different");
+                unsure += i32::from(answer == "unsure");
+            } else {
+                assert_ne!(answer, "same", "{told}");
+            }
+        }
+    }
+    // three standard deviations of a count
+    let most = stated + 3.0 * stated.sqrt();
+    assert!(
+        f64::from(rejected) <= most && unsure <= 2,
+        "{rejected} of {stated}, {unsure} unsure"
+    );
 }

@@ -4,12 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
+use tactus_core::dsp::Plan;
 use tactus_core::explorer::{Answer, Config, Strategy};
-use tactus_core::features::{Movement, PropertySet};
+use tactus_core::features::{Movement, Observation, PropertySet};
 use tactus_core::table::{Action, POPULATION, Table};
 use tactus_lab::data::quality::SeenSlides;
 use tactus_lab::data::recordings::RecordingSet;
-use tactus_lab::data::replay::MeasuredSlide;
+use tactus_lab::data::replay::{MeasuredSlide, measure};
 use tactus_lab::eval::evaluate::{Method, explorer};
 use tactus_lab::eval::first::learn_first;
 use tactus_lab::eval::learn::Expected;
@@ -17,12 +18,19 @@ use tactus_lab::eval::learned::LeftOut;
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verified::{Slide, Verified, name, print_answer, print_slide};
 use tactus_lab::eval::verify::{false_accept, put};
+use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
+use tactus_lab::sim::rig::{SimError, SimRig};
 
 use super::args::Stop;
 use super::names::find;
 use super::output::{Done, Format, UsageError, print_json};
+use super::progress::with_progress;
 use super::table_file::read_table;
-use super::textures::{find_material, measure_folder, of_one_finger};
+use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
+
+/// Trials that a simulated probe has learned each texture from, and slides that it tries at most.
+const LEARNED: u32 = 5;
+const ATTEMPTS: usize = 60;
 
 /// Say whether slides are of the same texture as a reference
 #[derive(clap::Args)]
@@ -31,26 +39,39 @@ Examples:
   tactus verify --reference DIR --texture cork --sample NEW                 the other textures of DIR give the scale
   tactus verify --table TABLE --texture cork --sample NEW --material cork   a texture of a table
   tactus verify --table TABLE --reference ROLL7 --sample ROLL8              one that the table does not have
+  tactus verify --simulated --texture burlap                                live, with burlap under the simulated finger
+  tactus verify --simulated --texture burlap --material marble              with something else
 
 Slides are taken in the order of time until it is the same, different, or none is left. It is different if fewer than
 --false-alarm of the reference's own slides would look so, and the same if that is more probable than --threshold.
 Exit code: 0 the same, 3 different or not sure.")]
 pub(crate) struct Args {
     /// Recordings of the reference
-    #[arg(long, value_name = "DIR", required_unless_present = "table")]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["table", "simulated"])]
     reference: Option<PathBuf>,
-    /// The reference's texture: of the recordings, or of the table
+    /// The reference's texture: of the recordings, of the table, or one that the simulated probe knows
     #[arg(long, value_name = "NAME")]
     texture: Option<String>,
     /// The table that gives the scale; without it, one is learned from all textures of the reference's recordings
     #[arg(long, value_name = "TABLE")]
     table: Option<PathBuf>,
     /// Recordings of what is held against it
-    #[arg(long, value_name = "DIR")]
-    sample: PathBuf,
-    /// The texture of these recordings, where they have several
+    #[arg(long, value_name = "DIR", required_unless_present = "simulated")]
+    sample: Option<PathBuf>,
+    /// The texture of these recordings, where they have several; what lies under the simulated finger, the reference's
+    /// unless given
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
+    /// Slide live on the simulated rig, in place of recordings; the probe has learned the reference and others there
+    #[arg(long, conflicts_with_all = ["reference", "table", "sample"], requires = "texture")]
+    simulated: bool,
+    /// How many textures the simulated probe knows
+    #[arg(long, value_name = "N", default_value_t = 20, requires = "simulated",
+        value_parser = clap::value_parser!(u8).range(4..=117))]
+    among: u8,
+    /// Another seed is another world, and another trial
+    #[arg(long, default_value_t = 1, requires = "simulated")]
+    seed: u64,
     #[command(flatten)]
     stop: Stop,
     /// How to print the answer
@@ -61,8 +82,16 @@ pub(crate) struct Args {
 const ITSELF: &str = "--sample is the reference itself: give other slides, or --material with another texture of \
     the folder";
 
+struct Made {
+    number: u32,
+    movement: Movement,
+    observation: Observation,
+}
+
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
-    let folder = &args.sample;
+    let Some(folder) = &args.sample else {
+        return run_simulated(args, out);
+    };
     let reference_folder = args.reference.as_deref();
     let is_itself = reference_folder.is_some_and(|reference| same_folder(reference, folder));
     ensure!(!is_itself || args.material.is_some(), ITSELF);
@@ -100,8 +129,70 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
     let measures = slides.iter().fold(PropertySet::ALL, |all, slide| {
         all.and(slide.measurement.properties.measured())
     });
-    let sample = (sample_name, left_out);
-    hold(args, (&bytes, texture), sample, measures, &slides, out)
+    let made = slides.into_iter().map(|slide| {
+        Ok(Made {
+            number: slide.number,
+            movement: slide.movement,
+            observation: slide.observation(),
+        })
+    });
+    let sample = (sample_name, Some(left_out));
+    hold(args, (&bytes, texture), sample, measures, made, out)
+}
+
+/// Learns on the simulated rig, then slides there, movement after movement.
+fn run_simulated(args: &Args, out: &mut impl Write) -> anyhow::Result<Done> {
+    let wanted = args.texture.as_ref().context("--texture NAME")?;
+    let reference = find_textures(std::slice::from_ref(wanted))?[0];
+    let under = match &args.material {
+        Some(name) => find_textures(std::slice::from_ref(name))?[0],
+        None => reference,
+    };
+    let collection = Collection::new(
+        args.seed,
+        Collection::spread(reference, args.among),
+        LEARNED,
+    );
+    let calibration = calibrated(collection.setup(reference, 0))?;
+    let textures = collection.textures.len() as u64;
+    let method = Method::Fused.method();
+    let bytes = with_progress(textures, "learning textures", |done| {
+        collection.learn(method, calibration, done)
+    })?;
+    let texture = Table::read(&bytes)?.find(texture_name(reference));
+    let texture = texture.context("the reference was not learned; please report this")?;
+    // a trial that nothing was learned from
+    let mut rig = SimRig::new(collection.setup(under, 1));
+    rig.control().calibrate(calibration)?;
+    rig.home()?;
+    let plan = Plan::new();
+    let movements = Collection::MOVEMENTS.into_iter().cycle();
+    let made = movements
+        .zip(1..)
+        .take(ATTEMPTS)
+        .filter_map(|(movement, number)| {
+            let slide = match rig.record(movement) {
+                // it is made again, after the others
+                Err(SimError::Fault(fault)) if fault.is_of_the_movement() => return None,
+                Err(why) => return Some(Err(why.into())),
+                Ok(slide) => slide,
+            };
+            let measured = measure(&plan, &slide).ok()?;
+            Some(Ok(Made {
+                number,
+                movement,
+                observation: Observation::from(&measured),
+            }))
+        });
+    let name = texture_name(under).to_owned();
+    hold(
+        args,
+        (&bytes, texture),
+        (name, None),
+        PropertySet::ALL,
+        made,
+        out,
+    )
 }
 
 fn index_of(table: Table<'_>, movement: Movement) -> Option<u8> {
@@ -113,9 +204,9 @@ fn index_of(table: Table<'_>, movement: Movement) -> Option<u8> {
 fn hold(
     args: &Args,
     (bytes, texture): (&[u8], u16),
-    (sample, left_out): (String, LeftOut),
+    (sample, left_out): (String, Option<LeftOut>),
     measures: PropertySet,
-    slides: &[&MeasuredSlide],
+    slides: impl Iterator<Item = anyhow::Result<Made>>,
     out: &mut impl Write,
 ) -> anyhow::Result<Done> {
     let table = Table::read(bytes)?;
@@ -127,8 +218,9 @@ fn hold(
     let mut verified = Verified::new(table, texture, &config)?;
     let mut explorer = explorer(bytes, measures, config, Some(&[texture]))?;
     verified.sample = Some(sample);
-    verified.left_out = Some(left_out);
-    for slide in slides.iter().take(args.stop.max_slides.into()) {
+    verified.left_out = left_out;
+    for slide in slides.take(args.stop.max_slides.into()) {
+        let slide = slide?;
         let Some(movement) = index_of(table, slide.movement) else {
             continue;
         };
@@ -136,7 +228,7 @@ fn hold(
             movement,
             property: None,
         };
-        explorer.observe(action, &slide.observation())?;
+        explorer.observe(action, &slide.observation)?;
         let Some(now) = explorer.verification() else {
             continue;
         };
@@ -153,6 +245,11 @@ fn hold(
             break;
         }
     }
+    ensure!(
+        !verified.slides.is_empty(),
+        "no slide on {} was good; another --seed makes another trial",
+        verified.sample.as_deref().unwrap_or("the sample")
+    );
     verified.false_accept = false_accept(&explorer, texture);
     match args.format {
         Format::Json => print_json(&verified, out)?,
