@@ -68,7 +68,7 @@ const WRITES: [&str; 6] = [
     "learn-by-hand --textures 1,9 --trials 2 --out OUT",
     "report t.tact --out OUT",
     "convert identify.jsonl --mcap OUT",
-    "identify --simulated --among 2 --plot OUT",
+    "table t.tact --plot OUT",
     "unpack OUT",
 ];
 

@@ -372,7 +372,7 @@ fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
             "What would help:",
         ],
     );
-    // well-formed and complete
+    // well-formed, complete, and the map is in it
     let html = String::from_utf8(at.read("page.html")).unwrap();
     let html = html.strip_prefix("<!DOCTYPE html>").unwrap_or(&html);
     let html = roxmltree::Document::parse(html.trim()).unwrap();
@@ -382,6 +382,7 @@ fn a_table_has_a_report_as_text_as_an_object_and_as_a_page() {
             .into_iter()
             .all(has)
     );
+    assert!(html.descendants().any(|n| n.tag_name().name() == "svg"));
     // without recordings there is nothing that users would be told
     assert!(at.json("report table", 0)["recorded"].is_null());
 }

@@ -45,7 +45,7 @@ fn nothing_is_written_where_a_planted_link_leads() {
         (simulate, "INCOMPLETE.part"),
         (simulate, "INCOMPLETE.lock"),
         (simulate, "INCOMPLETE"),
-        ("identify --simulated --among 2 --plot", ".tactus-plot.part"),
+        ("table t.tact --plot", ".tactus-plot.part"),
         (
             "learn --recordings own --train-slides 2 --out",
             "../.out.tactus-part",

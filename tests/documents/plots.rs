@@ -10,11 +10,12 @@ use super::book::{run, tactus};
 const RECORDINGS: &str = "--recordings host-tools/recordings/simulated --train-slides 2";
 
 /// Commands that draw.
-fn commands() -> [String; 3] {
+fn commands() -> [String; 4] {
     [
         format!("evaluate {RECORDINGS} --runs 300 --method paper --threshold 0.97"),
         format!("identify {RECORDINGS} --material 91 --method random --format json"),
         "identify --simulated --among 4 --seed 3".to_owned(),
+        "table tests/golden/paper.tact".to_owned(),
     ]
 }
 

@@ -15,6 +15,7 @@ pub mod learned;
 pub mod novelty;
 pub mod open_set;
 mod pace;
+pub mod places;
 pub mod refresh;
 pub mod reliability;
 pub mod report;

@@ -6,7 +6,6 @@
 
 mod message;
 mod monitor;
-mod places;
 mod scene;
 mod session;
 mod slides;

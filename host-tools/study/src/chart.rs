@@ -7,9 +7,9 @@ mod svg;
 
 use plotters::prelude::*;
 
-use labels::{Area, lines, width};
+use labels::{Area, lines, place, width};
 pub(crate) use svg::{COLOURS, EM, GREY, WIDTH};
-use svg::{FONT, Failed, From, Root, TEXT, Tip, caption, figure, write};
+use svg::{FONT, Failed, From, INK, Root, TEXT, Tip, caption, figure, write};
 pub use svg::{Figure, escaped};
 
 /// The mark at a point.
@@ -35,6 +35,8 @@ pub(crate) struct Series {
     pub(crate) line: Option<Line>,
     pub(crate) width: u32,
     pub(crate) points: Vec<(f64, f64)>,
+    /// Written beside each point where there is room; nothing where it is empty.
+    pub(crate) labels: Vec<String>,
     /// Tooltip of each point; empty for none.
     pub(crate) says: Vec<String>,
 }
@@ -60,6 +62,7 @@ impl Series {
             line: None,
             width: 2,
             points,
+            labels: Vec::new(),
             says: Vec::new(),
         }
     }
@@ -89,6 +92,8 @@ impl Series {
 
 pub(crate) struct Chart<'a> {
     pub(crate) title: String,
+    /// Its description, for those who cannot see it; empty if the title says it.
+    pub(crate) about: String,
     /// Quantity of an axis, with its unit.
     pub(crate) x: &'a str,
     pub(crate) y: &'a str,
@@ -109,7 +114,7 @@ const PANEL: (u32, u32) = (WIDTH, 350);
 const LINE: i32 = TEXT as i32 + 2;
 
 /// Range that holds all values, with a little margin.
-fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn buffer(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .filter(|v| v.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
@@ -139,6 +144,7 @@ impl<'a> Chart<'a> {
         let points = series.iter().flat_map(|s| &s.points).map(|p| p.1);
         Self {
             title: title.into(),
+            about: String::new(),
             x,
             y,
             x_range,
@@ -157,7 +163,7 @@ impl<'a> Chart<'a> {
     }
 
     pub(crate) fn figure(self, id: impl Into<String>) -> anyhow::Result<Figure> {
-        figure(id, &self.title, "", self.size, |root| {
+        figure(id, &self.title, &self.about, self.size, |root| {
             Ok(self.draw(root)?.1)
         })
     }
@@ -220,6 +226,7 @@ impl<'a> Chart<'a> {
         let [left, right] = [x.start.min(x.end), x.start.max(x.end)];
         let [top, bottom] = [y.start.min(y.end), y.start.max(y.end)];
         let mut tips = Vec::new();
+        let (mut points, mut labels): (Vec<_>, Vec<_>) = Default::default();
         for series in &self.series {
             let at: Vec<(i32, i32)> = series
                 .points
@@ -233,6 +240,19 @@ impl<'a> Chart<'a> {
                 area: [x - 8, y - 8, x + 8, y + 8],
                 says: says.clone(),
             }));
+            points.extend(at.iter().zip(&series.labels).map(|(at, _)| *at));
+            labels.extend(series.labels.iter().cloned());
+        }
+        let inside = [left + 2, top + 2, right - 2, bottom - 2];
+        let placed = place(&points, &labels, EM, inside);
+        for ((at, label), middle) in points.iter().zip(&labels).zip(placed) {
+            let Some((x, y)) = middle else { continue };
+            let half = width(label, EM) / 2;
+            let near = ((at.0).clamp(x - half, x + half), (at.1).clamp(y - 8, y + 8));
+            if (near.0 - at.0).abs() + (near.1 - at.1).abs() > 12 {
+                root.draw(&PathElement::new(vec![*at, near], BLACK.mix(0.4)))?;
+            }
+            write(root, label, (x, y), From::Middle, INK)?;
         }
         Ok(([left, top, right, bottom], tips))
     }

@@ -3,3 +3,5 @@
 pub mod control;
 pub mod evaluation;
 pub mod exploration;
+pub mod map;
+pub mod trade_off;

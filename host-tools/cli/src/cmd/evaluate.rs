@@ -31,7 +31,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         ..args.stop.config(args.method)
     };
     if args.verify {
-        return verify::run(args, &experiment, protocol, config, out);
+        return verify::run(args, &experiment, protocol, config, canvas, out);
     }
     if args.novelty.is_some() {
         return novelty::leave_one_out(args, &experiment, protocol, config, out);

@@ -59,7 +59,8 @@ Examples:
   tactus identify --recordings DIR --material 3 --table FILE  with a table that `tactus learn` wrote
   tactus identify --simulated --plot pictures                 with pictures
 
---plot draws how probable each texture was (posterior).")]
+--plot draws how probable each texture was (posterior), and the unknown beside its two best
+candidates (spectrum).")]
 pub(crate) struct Args {
     #[command(flatten)]
     from: Recordings,

@@ -15,6 +15,7 @@ use tactus_lab::eval::report::{RUNS, Report, Slides};
 use tactus_lab::eval::samples;
 use tactus_lab::eval::show::count;
 use tactus_study::page::render;
+use tactus_study::pictures::map;
 
 use super::args::Recordings;
 use super::output::{Format, UsageError, percent, print_json, verdict_rows};
@@ -67,6 +68,7 @@ struct Page<'r> {
     report: &'r Report,
     /// Its own figures in a sentence.
     figures: Option<String>,
+    map: String,
 }
 
 pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
@@ -112,6 +114,7 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
             command: command(file, args),
             report: &report,
             figures: report.table.open_set.as_ref().map(open_set::in_words),
+            map: map::figure(table)?.svg,
         };
         let page = render(include_str!("report/page.html"), &page)?;
         write_file(path, page.as_bytes(), args.force)?;

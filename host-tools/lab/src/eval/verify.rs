@@ -18,6 +18,7 @@ use crate::eval::learned::note_learned;
 /// Slides after which it is counted.
 pub const SLIDES: usize = 3;
 const OTHERS: usize = 3;
+const POINTS: usize = 60;
 
 /// The result of verifications.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -41,6 +42,8 @@ pub struct After {
     pub false_reject: f64,
     /// Share of others' that is called the same.
     pub false_accept: f64,
+    /// Shares of false rejects and false accepts, limit by limit.
+    pub curve: Vec<[f64; 2]>,
 }
 
 /// Shares of answers, which add up to 1.
@@ -190,17 +193,19 @@ impl After {
             let wrong = of.clone().filter(|v| v.answers[after] == answer).count();
             wrong as f64 / of.count().max(1) as f64
         };
+        let (equal_error, curve) = trade_off(&own, &others);
         Self {
             slides: after + 1,
-            equal_error: equal_error(&own, &others),
+            equal_error,
             false_reject: answered(true, Answer::Different),
             false_accept: answered(false, Answer::Same),
+            curve,
         }
     }
 }
 
-/// The rate at which false rejects and false accepts are equal, of sorted scores.
-fn equal_error(own: &[f64], others: &[f64]) -> f64 {
+/// The rate at which false rejects and false accepts are equal, and the curve of both, of sorted scores.
+fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     let at = |limit: f64| {
         let rejected = own.len() - own.partition_point(|s| *s <= limit);
         let accepted = others.partition_point(|s| *s <= limit);
@@ -213,7 +218,19 @@ fn equal_error(own: &[f64], others: &[f64]) -> f64 {
     limits.sort_by(f64::total_cmp);
     let equal = limits.iter().map(|limit| at(*limit));
     let equal = equal.min_by(|a, b| (a[0] - a[1]).abs().total_cmp(&(b[0] - b[1]).abs()));
-    equal.map_or(0.0, |[a, b]| f64::midpoint(a, b))
+    let equal = equal.map_or(0.0, |[a, b]| f64::midpoint(a, b));
+    // as many points among the own ones as among the others, the far ends of both among them
+    let places = (0..POINTS).map(|n| n as f64 / (POINTS - 1) as f64);
+    let of = |scores: &[f64], share: f64| {
+        let place = (share * (scores.len() as f64 - 1.0)).round() as usize;
+        scores.get(place).copied()
+    };
+    let own_tail = places.clone().filter_map(|p| of(own, 1.0 - 0.25 * p * p));
+    let others_tail = places.filter_map(|p| of(others, 0.25 * p * p));
+    let mut at_limits: Vec<f64> = own_tail.chain(others_tail).collect();
+    at_limits.sort_by(f64::total_cmp);
+    at_limits.dedup();
+    (equal, at_limits.into_iter().map(at).collect())
 }
 
 const NOTHING_IN_COMMON: &str = "the reference has no slide at a movement of the table with the features that it \
@@ -404,11 +421,18 @@ mod tests {
         // own scores 0 to 1, others' 0.9 to 1.9, evenly: a tenth of each is beyond the other's end
         let own: Vec<f64> = (0..1000).map(|n| f64::from(n) / 1000.0).collect();
         let others: Vec<f64> = own.iter().map(|s| s + 0.9).collect();
-        let equal = equal_error(&own, &others);
+        let (equal, curve) = trade_off(&own, &others);
         assert!((equal - 0.05).abs() < 0.002, "{equal}");
+        assert!(
+            curve
+                .windows(2)
+                .all(|w| w[0][0] >= w[1][0] && w[0][1] <= w[1][1])
+        );
         // apart, nothing is wrong; the same, half
-        let far: Vec<f64> = own.iter().map(|s| s + 2.0).collect();
-        assert_eq!(equal_error(&own, &far), 0.0);
-        assert!((equal_error(&own, &own) - 0.5).abs() < 0.01);
+        assert_eq!(
+            trade_off(&own, &own.iter().map(|s| s + 2.0).collect::<Vec<_>>()).0,
+            0.0
+        );
+        assert!((trade_off(&own, &own).0 - 0.5).abs() < 0.01);
     }
 }

@@ -11,8 +11,8 @@ use tactus_core::wire::{self, Event};
 use crate::eval::open_set::in_words;
 
 use super::message::{Expected, Happening, KnownTable, Measured, name};
-use super::places::{Plane, distances, slide_distances};
 use super::standing::{Followed, PLAN, Standing};
+use crate::eval::places::{Plane, distances, slide_distances};
 use crate::eval::transcript::Answer;
 use crate::sim::collection::texture_number;
 
@@ -55,7 +55,7 @@ impl ProbeMonitor {
         };
         self.planes.clear();
         for (movement, _) in (0..).zip(table.movements()) {
-            let plane = Plane::of(&distances(table, movement));
+            let plane = Plane::of(&distances(table, Some(movement)));
             self.planes.push(match self.planes.first() {
                 Some(first) => plane.turned_to(first),
                 None => plane,

@@ -21,6 +21,7 @@ pub(crate) fn matrix(
     let chart = Chart {
         y_range: (n + 0.5, 0.5),
         size: (WIDTH, WIDTH),
+        about: told.to_owned(),
         ..Chart::new(title, axis, axis, (0.5, n + 0.5), Vec::<Series>::new())
     };
     let mut area = [0; 4];

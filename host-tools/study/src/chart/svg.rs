@@ -24,6 +24,8 @@ pub(crate) const COLOURS: [RGBColor; 7] = [
 ];
 /// Colour of lines that are only there for comparison.
 pub(crate) const GREY: RGBColor = RGBColor(110, 110, 110);
+/// Black for words that lie on lines: paper is left round them.
+pub(super) const INK: RGBColor = RGBColor(1, 1, 1);
 
 /// Height of the letters as the library counts it: from the highest to the lowest of any letter, px.
 pub(super) const TEXT: u32 = 17;
@@ -34,9 +36,10 @@ pub(crate) const WIDTH: u32 = 480;
 pub(super) const FONT: &str = "sans-serif";
 
 /// The colours on a dark screen: white becomes dark and black light, and the darker colours brighter.
-const STYLE: &str = "<style>@media screen and (prefers-color-scheme:dark){\
+const STYLE: &str = "<style>[fill=\"#010101\"]{paint-order:stroke;stroke:#fff;stroke-width:3px;stroke-linejoin:round}\
+@media screen and (prefers-color-scheme:dark){\
 rect[fill=\"#FFFFFF\"]{fill:#15181c}[stroke=\"#FFFFFF\"]{stroke:#15181c}\
-[fill=\"#000000\"]{fill:#ececec}[stroke=\"#000000\"]{stroke:#ececec}\
+[fill=\"#010101\"]{fill:#ececec;stroke:#15181c}[fill=\"#000000\"]{fill:#ececec}[stroke=\"#000000\"]{stroke:#ececec}\
 [fill=\"#6E6E6E\"]{fill:#9a9a9a}[stroke=\"#6E6E6E\"]{stroke:#9a9a9a}\
 [fill=\"#0072B2\"]{fill:#2b8fd0}[stroke=\"#0072B2\"]{stroke:#2b8fd0}}</style>";
 /// Style that fits the outermost drawing to its place.

@@ -41,7 +41,7 @@ known one is taken for new. --verify holds the slides of each texture against it
 three others, as `tactus verify` does, and counts the errors: at the limits, and where both are equal. These need the
 method fused.
 
---plot draws what is told of each texture (confusion).
+--plot draws what is told of each texture (confusion), or with --verify one error against the other (trade-off).
 
 Examples:
   tactus evaluate --recordings DIR --protocol drift
@@ -69,7 +69,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, conflicts_with = "plot")]
     pub(crate) novelty: Option<Novelty>,
     /// Count how often slides are rightly called the same as a reference, and how often wrongly
-    #[arg(long, conflicts_with_all = ["novelty", "plot"])]
+    #[arg(long, conflicts_with = "novelty")]
     pub(crate) verify: bool,
     /// It is one of the textures known, and the explorer knows it: nothing is told to be new, and names are told as
     /// sure

@@ -7,9 +7,11 @@ use tactus_core::explorer::Config;
 use tactus_lab::eval::experiment::Experiment;
 use tactus_lab::eval::show::count;
 use tactus_lab::eval::verify::{AnswerShares, Verified, verify};
+use tactus_study::pictures::trade_off;
 
 use super::experiment::{Args, Figures};
 use crate::cmd::output::{Format, print_json};
+use crate::cmd::plot::Canvas;
 use crate::cmd::progress::with_progress;
 
 pub(super) fn run(
@@ -17,6 +19,7 @@ pub(super) fn run(
     experiment: &Experiment,
     protocol: &'static str,
     config: Config,
+    canvas: Option<Canvas>,
     out: &mut impl Write,
 ) -> anyhow::Result<()> {
     ensure!(
@@ -28,9 +31,14 @@ pub(super) fn run(
     })?;
     let figures = Figures::new(args, experiment, protocol, &verified);
     match args.format {
-        Format::Json => print_json(&figures, out),
-        Format::Text => print(&figures, out),
+        Format::Json => print_json(&figures, out)?,
+        Format::Text => print(&figures, out)?,
     }
+    if let Some(canvas) = canvas {
+        let figure = trade_off::figure(&verified.verify)?;
+        canvas.write(&[figure], out)?;
+    }
+    Ok(())
 }
 
 fn print(figures: &Figures<'_, Verified>, out: &mut impl Write) -> anyhow::Result<()> {
