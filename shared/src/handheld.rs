@@ -18,7 +18,6 @@ mod speed;
 mod spelling;
 pub mod states;
 pub mod touch;
-pub mod weights;
 
 pub use draw::draw;
 pub use judge::{

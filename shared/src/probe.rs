@@ -18,7 +18,7 @@ mod transfer;
 pub use calibrate::restore;
 pub use dispatch::{Probe, Turn, receive, turn};
 pub(crate) use identify::candidates;
-pub use identify::{Identification, identify};
+pub use identify::{Identification, event_of, identify};
 pub use memory::Memory;
 pub use status::{RigState, TableInUse, Watch};
 pub use train::train;

@@ -46,47 +46,10 @@ fn wav_of_field_recorders() {
         ],
     );
     verdict(&at, "");
-
-    let at = Scratch::new();
-    each(192_000.0, 0.0115, |name, number, x| {
-        // more than 4 GB may come: the length is in a chunk of its own
-        let plain = wav(192_000, 16, &[x]);
-        let data = &plain[44..];
-        let mut file = b"RF64\xff\xff\xff\xffWAVEds64\x1c\0\0\0".to_vec();
-        file.extend((data.len() as u64 + 72).to_le_bytes());
-        file.extend((data.len() as u64).to_le_bytes());
-        file.extend([0; 12]);
-        file.extend(&plain[12..40]);
-        file.extend(b"\xff\xff\xff\xff");
-        file.extend(data);
-        at.write(&format!("data/{name}_{number}.wav"), file);
-    });
-    verdict(&at, "");
 }
 
 #[test]
 fn tables_of_loggers() {
-    // a row of units, three axes, ms
-    let at = Scratch::new();
-    each(1600.0, 0.95, |name, number, x| {
-        let line = |n, x| format!("{:.3},{:.4},{x:.4},9.81\r\n", n as f64 / 1.6, 0.1 * x);
-        at.write(
-            &format!("data/{name}/session{}/{number}.csv", number % 2),
-            format!("time,ax,ay,az\r\nms,m/s2,m/s2,m/s2\r\n{}", rows(x, line)),
-        );
-    });
-    let said = at.printed("import data recordings --dry-run");
-    assert_says(
-        &said,
-        &[
-            "1600 Hz",
-            "counts per m/s2",
-            "liveliest of ay (m/s2), ax (m/s2)",
-        ],
-    );
-    let set = verdict(&at, "");
-    assert_eq!(set.slides(0)[0].labels.session, "session0");
-
     // UTF-16 without a header, time in microseconds since a start
     let at = Scratch::new();
     each(6250.0, 0.34, |name, number, x| {
@@ -195,46 +158,7 @@ fn one_long_table_with_numbers_for_textures() {
 }
 
 #[test]
-fn arrays_of_half_floats_of_integers_and_of_slides() {
-    let at = Scratch::new();
-    each(5000.0, 0.42, |name, number, x| {
-        let half = |x: f64| -> u16 {
-            let bits = (x as f32).to_bits();
-            let exponent = (bits >> 23 & 255) as i32 - 112;
-            let sign = (bits >> 16 & 0x8000) as u16;
-            if exponent <= 0 {
-                sign
-            } else {
-                sign | (exponent as u16) << 10 | (bits >> 13 & 0x3ff) as u16
-            }
-        };
-        // two channels, Fortran's order: one after the other
-        let both = x.iter().map(|_| 0.25).chain(x.iter().copied());
-        let data: Vec<u8> = both.flat_map(|x| half(x).to_le_bytes()).collect();
-        let file = npy("<f2", &format!("{}, 2", x.len()), &[]);
-        let head = String::from_utf8_lossy(&file[10..]).replace("False, ", "True,  ");
-        let file = [b"\x93NUMPY\x01\0\x76\0", head.as_bytes(), &data].concat();
-        at.write(&format!("data/{name}/{number}.npy"), file);
-    });
-    let said = at.printed("import data recordings --dry-run --rate 5000");
-    assert_says(&said, &["numpy array", "channel 2"]);
-    verdict(&at, "--rate 5000");
-
-    let at = Scratch::new();
-    each(2500.0, 0.85, |name, number, x| {
-        let counts = x.iter().map(|x| (x * 8e6) as i32);
-        let data: Vec<u8> = counts.flat_map(i32::to_le_bytes).collect();
-        at.write(
-            &format!("data/{name}_{number}.npy"),
-            npy("<i4", &format!("{},", x.len()), &data),
-        );
-    });
-    // whole numbers are counts only where one says so, and these do not fit
-    let why = at.error("import data recordings --rate 2500 --unit counts", 1);
-    assert_says(&why, &["samples have 32767 at most", "--gain 0.000"]);
-    verdict(&at, "--rate 2500");
-
-    // X, y and the rate in one file
+fn an_npz_of_slides_names_and_rate() {
     let at = Scratch::new();
     let (mut all, mut labels) = (Vec::new(), Vec::new());
     each(4000.0, 0.53, |name, _, x| {

@@ -12,7 +12,6 @@ use tactus_lab::data::replay::measure_all;
 use tactus_lab::eval::evaluate::{Outcome, evaluate};
 use tactus_lab::eval::experiment::{Experiment, Protocol, Run};
 use tactus_lab::eval::learn::Expected;
-use tactus_study::fabricslide::FabricSet;
 use tactus_tests::{count, data};
 
 use crate::oracle;
@@ -287,25 +286,6 @@ fn property_worlds_are_decided_as_in_f64() {
             experiment,
             Some(FeatureSet::Properties),
             count(800, 400),
-        );
-    }
-}
-
-/// Movements are chosen among fifteen.
-#[test]
-fn fabrics_are_decided_as_in_f64() {
-    let Some(folder) = data("fabricslide") else {
-        return;
-    };
-    let set = FabricSet::open(&folder).unwrap();
-    for learned in 0..2 {
-        let experiment = set.experiment(learned, 1).unwrap();
-        let name = format!("fabrics, learned from repetition {learned}");
-        decided_alike(
-            &name,
-            experiment,
-            Some(FeatureSet::Force),
-            count(4000, 1000),
         );
     }
 }

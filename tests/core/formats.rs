@@ -32,7 +32,7 @@ use tactus_lab::data::recording::Labels;
 use tactus_lab::data::recordings::{RecordingSet, files_of};
 use tactus_lab::sim::flash::{RamFlash, SECTOR};
 use tactus_link::follow::Follower;
-use tactus_link::log::{self, Line, LogError, TableParts};
+use tactus_link::log::{self, Line, TableParts};
 
 fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -555,7 +555,6 @@ fn a_log_of_other_versions_is_refused() {
     for version in (0..=u8::MAX).filter(|version| *version != PROTOCOL) {
         let other = text.replace("\"protocol\":1,", &format!("\"protocol\":{version},"));
         let why = log::read(other.as_bytes(), |_| ()).unwrap_err();
-        assert!(matches!(why, LogError::Protocol(of) if of == version));
         assert_eq!(
             why.to_string(),
             format!(

@@ -3,7 +3,6 @@
 mod arm;
 mod crush;
 mod early;
-mod fabricslide;
 mod fault_cases;
 mod faults;
 mod figures;
@@ -11,7 +10,6 @@ mod fixed_point;
 mod formats;
 mod fused_recipe;
 mod golden;
-mod half_words;
 mod high_force;
 mod oracle;
 mod pace;

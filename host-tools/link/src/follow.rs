@@ -15,53 +15,9 @@ use tactus_core::wire::{
 pub const ALLOWED: f32 = 1e-4;
 
 /// The reason why a stretch of an exploration could not be compared. The rest is followed nevertheless.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
-pub enum FollowError {
-    /// A report with samples was lost.
-    #[error(
-        "slide {slide}: block {expected} is missing, block {got} came; the slide is not compared"
-    )]
-    MissingBlock {
-        /// Number of the slide.
-        slide: u8,
-        /// Number of the block that should have come.
-        expected: u16,
-        /// Number of the one that came.
-        got: u16,
-    },
-    /// The samples of a slide never came.
-    #[error("slide {0}: no samples came; ask for them with `Stream` before the exploration")]
-    NoBlocks(u8),
-    /// A slide or its choice came out of order: a report was lost.
-    #[error(
-        "slide {got} came where slide {expected} was due; a report was lost, record the session again"
-    )]
-    Order {
-        /// Number of the slide that was due.
-        expected: u8,
-        /// Number that came.
-        got: u8,
-    },
-    /// The probe has properties of the slide, and the samples that came give none.
-    #[error(
-        "slide {slide}: the samples give no properties here ({why}); the last blocks may be missing"
-    )]
-    Slide {
-        /// Number of the slide.
-        slide: u8,
-        /// The reason why they do not.
-        why: SlideError,
-    },
-    /// The explorer here refuses the slide that the probe reported.
-    #[error(
-        "slide {slide}: the explorer here cannot use the slide; read the table of the probe again (`tactus device \
-             identify --log` does)"
-    )]
-    Observe {
-        /// Number of the slide.
-        slide: u8,
-    },
-}
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct FollowError(String);
 
 /// Another choice than the one here.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -246,7 +202,9 @@ impl<'t> Follower<'t> {
     fn in_order(&self, got: u8) -> Result<(), FollowError> {
         let expected = self.due();
         if got != expected {
-            return Err(FollowError::Order { expected, got });
+            return Err(FollowError(format!(
+                "slide {got} came where slide {expected} was due; a report was lost, record the session again"
+            )));
         }
         Ok(())
     }
@@ -299,11 +257,10 @@ impl<'t> Follower<'t> {
         let expected = slide.next_block();
         if block.number != expected {
             self.samples = None;
-            return Err(FollowError::MissingBlock {
-                slide: slide_number,
-                expected,
-                got: block.number,
-            });
+            let got = block.number;
+            return Err(FollowError(format!(
+                "slide {slide_number}: block {expected} is missing, block {got} came; the slide is not compared"
+            )));
         }
         slide.take(block);
         // as the probe does: after each block of a slide
@@ -333,7 +290,10 @@ impl<'t> Follower<'t> {
             None => self.explorer.observe(action, &observation).map(|()| true),
         };
         if taken != Ok(true) {
-            return Err(FollowError::Observe { slide });
+            return Err(FollowError(format!(
+                "slide {slide}: the explorer here cannot use the slide; read the table of the probe again (`tactus \
+                 device identify --log` does)"
+            )));
         }
         let here = self.explorer.posterior();
         let agreement = &mut self.agreement;
@@ -357,7 +317,9 @@ impl<'t> Follower<'t> {
             // the missing block was an error before
             None => return Ok(()),
             Some(samples) if samples.next_block() == 0 => {
-                return Err(FollowError::NoBlocks(slide));
+                return Err(FollowError(format!(
+                    "slide {slide}: no samples came; ask for them with `Stream` before the exploration"
+                )));
             }
             Some(mut samples) => {
                 let pdc = core::mem::take(&mut self.pdc);
@@ -369,7 +331,11 @@ impl<'t> Follower<'t> {
                     Some(look) => look.cloned().unwrap_or(Err(SlideError::NotStarted)),
                     None => samples.finish(),
                 };
-                measured.map_err(|why| FollowError::Slide { slide, why })?
+                measured.map_err(|why| {
+                    FollowError(format!(
+                        "slide {slide}: the samples give no properties here ({why}); the last blocks may be missing"
+                    ))
+                })?
             }
         };
         let here = SlideReport::from(&here);

@@ -19,55 +19,14 @@ const ST: u16 = 0x0483;
 /// An error on the way to a line, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LineError {
-    /// No board is plugged in.
-    #[error("no NUCLEO here: plug in its USB socket CN1 (LD4 must be lit), or give --port. {}", others(.0))]
-    None(Vec<PortInfo>),
-    /// More than one.
-    #[error("several boards are plugged in: choose one with --port\n{}", lines(.0))]
-    Several(Vec<PortInfo>),
-    /// No such port.
-    #[error("{port}: there is no such port. {}", others(.found))]
-    NotThere {
-        /// Its name.
-        port: String,
-        /// Those that there are.
-        found: Vec<PortInfo>,
-    },
-    /// Another program has it.
-    #[error(
-        "{0} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). Close \
-             that; \
-             `fuser -v {0}` names it"
-    )]
-    Busy(String),
-    /// Another tactus has it.
-    #[error(
-        "{0} is used by another tactus: wait for it or end it, it cannot be watched from a second command"
-    )]
-    InUse(String),
     /// The user may not.
     #[error(
         "{0}: you may not open this port. On Linux: sudo usermod -aG dialout $USER, then log in again"
     )]
     Denied(String),
     /// Something else.
-    #[error("{port} cannot be opened: {why}; is it a serial port?")]
-    Serial {
-        /// Its name.
-        port: String,
-        /// The system's words.
-        why: serialport::Error,
-    },
-    /// No such address, or nobody there.
-    #[error(
-        "{address}: {why}. Is the emulated board running there (`cargo xtask emulate --port N`)?"
-    )]
-    Tcp {
-        /// Host and port.
-        address: String,
-        /// The system's words.
-        why: io::Error,
-    },
+    #[error("{0}")]
+    Said(String),
 }
 
 /// A serial port of this PC.
@@ -116,8 +75,9 @@ impl fmt::Display for PortInfo {
     }
 }
 
-fn lines(ports: &[PortInfo]) -> String {
-    let lines: Vec<String> = ports.iter().map(|port| format!("  {port}")).collect();
+fn lines<'p>(ports: impl IntoIterator<Item = &'p PortInfo>) -> String {
+    let lines = ports.into_iter().map(|port| format!("  {port}"));
+    let lines: Vec<String> = lines.collect();
     lines.join("\n")
 }
 
@@ -160,7 +120,11 @@ pub fn open_at(
     // however its address was written
     let same = tcp_address(name).map(|address| format!("tcp:{address}"));
     let lock = PortLock::take(same.as_deref().unwrap_or(name));
-    let lock = lock.ok_or_else(|| LineError::InUse(name.to_owned()))?;
+    let lock = lock.ok_or_else(|| {
+        LineError::Said(format!(
+            "{name} is used by another tactus: wait for it or end it, it cannot be watched from a second command"
+        ))
+    })?;
     let line = match tcp_address(name) {
         Some(address) => tcp_at(address, reads)?,
         None => serial(name, baud, reads)?,
@@ -172,9 +136,15 @@ pub fn open_at(
 pub fn only_nucleo(found: Vec<PortInfo>) -> Result<String, LineError> {
     let nucleos: Vec<&PortInfo> = found.iter().filter(|port| port.is_nucleo()).collect();
     match nucleos.as_slice() {
-        [] => Err(LineError::None(found)),
+        [] => Err(LineError::Said(format!(
+            "no NUCLEO here: plug in its USB socket CN1 (LD4 must be lit), or give --port. {}",
+            others(&found)
+        ))),
         [only] => Ok(only.name.clone()),
-        _ => Err(LineError::Several(nucleos.into_iter().cloned().collect())),
+        several => Err(LineError::Said(format!(
+            "several boards are plugged in: choose one with --port\n{}",
+            lines(several.iter().copied())
+        ))),
     }
 }
 
@@ -198,12 +168,17 @@ fn serial(port: &str, baud: u32, reads: Duration) -> Result<Box<dyn Line>, LineE
     Err(match why.kind() {
         Serial::Io(Io::PermissionDenied) => LineError::Denied(port),
         // serialport's word for a port that somebody else has, or one that Windows does not know
-        Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => LineError::Busy(port),
+        Serial::NoDevice if Path::new(&port).exists() || cfg!(windows) => LineError::Said(format!(
+            "{port} is busy: another program has it open (another tactus, a terminal such as minicom, ModemManager). \
+             Close that; `fuser -v {port}` names it"
+        )),
         Serial::NoDevice | Serial::Io(Io::NotFound) => {
-            let found = found();
-            LineError::NotThere { port, found }
+            let others = others(&found());
+            LineError::Said(format!("{port}: there is no such port. {others}"))
         }
-        _ => LineError::Serial { port, why },
+        _ => LineError::Said(format!(
+            "{port} cannot be opened: {why}; is it a serial port?"
+        )),
     })
 }
 
@@ -213,9 +188,10 @@ pub fn tcp(address: &str) -> Result<Box<dyn Line>, LineError> {
 }
 
 fn tcp_at(address: &str, reads: Duration) -> Result<Box<dyn Line>, LineError> {
-    let error = |why| LineError::Tcp {
-        address: address.to_owned(),
-        why,
+    let error = |why: io::Error| {
+        LineError::Said(format!(
+            "{address}: {why}. Is the emulated board running there (`cargo xtask emulate --port N`)?"
+        ))
     };
     let to = address.to_socket_addrs().map_err(error)?.next();
     let to = to.ok_or_else(|| error(io::ErrorKind::NotFound.into()))?;

@@ -111,34 +111,13 @@ fn named(path: &Path, why: &io::Error) -> io::Error {
 
 /// The reason why a log cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum LogError {
-    /// A line is none of a log.
-    #[error(
-        "line {line} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one"
-    )]
-    Line {
-        /// Its number, from 1.
-        line: usize,
-        /// The error.
-        why: serde_json::Error,
-    },
-    /// A report that no probe makes.
-    #[error("line {line} has a report that cannot be, with {what}: the log was changed")]
-    Impossible {
-        /// Its number, from 1.
-        line: usize,
-        /// The error.
-        what: &'static str,
-    },
-    /// Messages of another version.
-    #[error(
-        "written with version {0} of the messages, this program reads version {PROTOCOL}: replay it with the tactus \
-         that wrote it"
-    )]
-    Protocol(u8),
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
+#[error("{0}")]
+pub struct LogError(String);
+
+impl From<io::Error> for LogError {
+    fn from(why: io::Error) -> Self {
+        Self(why.to_string())
+    }
 }
 
 /// Most bytes of a line: the longest reports, many times over.
@@ -153,15 +132,25 @@ pub fn read(log: impl Read, mut each: impl FnMut(Line<'static>)) -> Result<(), L
             break;
         }
         let read = serde_json::from_slice(&line);
-        match read.map_err(|why| LogError::Line { line: number, why })? {
+        let none = |why: serde_json::Error| {
+            LogError(format!(
+                "line {number} is no line of a session's log ({why}); `tactus device identify --log FILE` writes one"
+            ))
+        };
+        match read.map_err(none)? {
             Line::Session { protocol, .. } if protocol != PROTOCOL => {
-                return Err(LogError::Protocol(protocol));
+                return Err(LogError(format!(
+                    "written with version {protocol} of the messages, this program reads version {PROTOCOL}: replay it \
+                     with the tactus that wrote it"
+                )));
             }
             line => {
                 if let Line::Report(report) = &line
                     && let Some(what) = impossible(&report.event)
                 {
-                    return Err(LogError::Impossible { line: number, what });
+                    return Err(LogError(format!(
+                        "line {number} has a report that cannot be, with {what}: the log was changed"
+                    )));
                 }
                 each(line);
             }

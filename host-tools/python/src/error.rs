@@ -10,9 +10,7 @@ use tactus_core::features::{MovementError, SlideError as OfSlide};
 use tactus_core::table::TableError as OfTable;
 use tactus_lab::data::recordings::RecordingError as OfRecordings;
 use tactus_lab::data::table_file::TableFileError;
-use tactus_lab::eval::evaluate::EvaluateError;
 use tactus_lab::eval::experiment::ExperimentError;
-use tactus_lab::eval::first::FirstError;
 use tactus_lab::eval::learn::TableError as LearnError;
 use tactus_lab::sim::collection::TrialError;
 use tactus_lab::sim::rig::SimError;
@@ -101,8 +99,6 @@ raise! {
     OfSlide => SlideError,
     OfTable => TableError,
     TableFileError => TableError,
-    FirstError => TableError,
-    EvaluateError => TableError,
     ExperimentError => TactusError,
     ExplorerError => TableError,
     ObserveError => TableError,

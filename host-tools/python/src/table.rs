@@ -13,7 +13,7 @@ use tactus_lab::data::recordings::files::open;
 use tactus_lab::data::table_file::{TableFileError, read_table};
 use tactus_lab::data::whole::write_whole;
 use tactus_lab::eval::evaluate::Method;
-use tactus_lab::eval::first::{FirstError, learn_first, taught};
+use tactus_lab::eval::first::{few, learn_first, taught};
 use tactus_lab::eval::learn::{Expected, learn_for};
 use tactus_lab::eval::open_set::{all_learned, with_figures};
 use tactus_lab::eval::table_summary::TableSummary;
@@ -104,7 +104,7 @@ impl Table {
         Self::of(work_on_all_cores(py, move |_| {
             let bytes = learn_first(&set, &measured, train_slides, method, features, &expected)?;
             let taught = taught(&set, &measured, train_slides)?;
-            Ok::<_, FirstError>(with_figures(bytes, &expected, &taught, || ())?)
+            with_figures(bytes, &expected, &taught, || ())
         })?)
     }
 
@@ -143,8 +143,9 @@ impl Table {
         for (texture, slides) in names.iter().zip(&all) {
             let texture = texture.clone();
             let row: Vec<_> = movements.iter().map(|&m| of(slides, m)).collect();
-            if let Some((few, &movement)) = row.iter().zip(&movements).find(|(s, _)| s.len() < 2) {
-                return Err(FirstError::few(&texture, movement, few.len()).raise());
+            if let Some((there, &movement)) = row.iter().zip(&movements).find(|(s, _)| s.len() < 2)
+            {
+                return Err(few(&texture, movement, there.len()).raise());
             }
             observed.push(row);
         }

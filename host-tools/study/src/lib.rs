@@ -2,7 +2,6 @@
 //! the identification among all 117 textures, beside the published numbers.
 
 pub mod chart;
-pub mod fabricslide;
 pub mod identify;
 pub mod page;
 pub mod pictures;

@@ -1,5 +1,4 @@
-//! An arm that holds the finger: the motion of its joints under a program's commanded velocities. The program is
-//! elsewhere: [`crate::arm_program`], or one in another language.
+//! An arm that holds the finger: the motion of its joints under the commanded velocities of [`crate::arm_program`].
 //!
 //! Its frame is the sample's, as a person has measured it: the height is off by some tenths of a millimetre, and the
 //! sample is not level in it. So only the force shows where the sample is.

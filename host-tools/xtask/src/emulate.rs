@@ -69,12 +69,7 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
             let image = match run {
                 "handheld" => HANDHELD,
                 "printer" => ARM,
-                _ if ["--arm-port", "--printer-port"]
-                    .iter()
-                    .any(|port| value(options, port).is_some()) =>
-                {
-                    ARM
-                }
+                _ if value(options, "--printer-port").is_some() => ARM,
                 _ => RIG,
             };
             Some(firmware::compile(&[image])?.remove(0))

@@ -58,8 +58,8 @@ enum Cli {
     },
     /// Run a long check or all of them: many explorations, power cuts, faults, fuzzing
     ///
-    /// Each part says in one sentence how it ended; with `all`, or with --book, that sentence is a row of a table. An
-    /// error if a part misses a limit.
+    /// Each part says in one sentence how it ended: a row of the table in docs/src/tests.md. An error if one misses a
+    /// limit.
     #[command(after_help = campaign::EXAMPLES)]
     Campaign(campaign::Options),
     /// Judge every data set that is there, with the defaults: the tables of the book's page of evidence

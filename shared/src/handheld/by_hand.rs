@@ -7,7 +7,7 @@ use super::jobs::{Outcome, work};
 use super::judge::MOVEMENT;
 use super::screen::{About, Screen};
 use super::speed::Moved;
-use super::states::{Answer, Handheld, Job, RequestedSlide, TICKS_HZ};
+use super::states::{Answer, Handheld, RequestedSlide, TICKS_HZ};
 use crate::features::{Property, PropertySet, Slide};
 use crate::probe::seams::{Events, RigHandle, StoredBytes, UnloadedRun};
 use crate::probe::{Probe, RigState, Watch};
@@ -121,7 +121,6 @@ impl<'p, H: Hand> ByHand<'p, H> {
             memory: 0.0,
             serves: false,
         };
-        by_hand.handheld.turns = by_hand.hand.feels_gravity();
         by_hand.use_calibration(calibration);
         by_hand
     }
@@ -428,11 +427,7 @@ where
         rig.pause();
         // the picture goes out meanwhile
         rig.hand.wait().await;
-        match job {
-            Job::Calibrate => rig.set_force(memory).await,
-            Job::TurnOver => rig.set_gravity(memory).await,
-            job => work(job, &mut rig.handheld, memory, events, log).await,
-        }
+        work(job, &mut rig.handheld, memory, events, log).await;
         rig.heed();
     }
 }

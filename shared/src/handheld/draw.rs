@@ -288,10 +288,6 @@ pub fn draw<D: DrawTarget<Color = BinaryColor>>(screen: &Screen<'_>, display: &m
         Screen::Learned(Err(why)) => brush.sentence("Not learned", why),
         Screen::Fault(trouble) => brush.fault(trouble),
         Screen::About(about) => brush.about_probe(about),
-        Screen::Calibrated(Ok(scale)) => brush.scale(scale),
-        Screen::Calibrated(Err(why)) => brush.sentence("Force not set", why),
-        Screen::Turned(Ok(turned)) => brush.turned(turned),
-        Screen::Turned(Err(why)) => brush.sentence("Not turned", why),
     }
 }
 

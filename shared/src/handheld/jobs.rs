@@ -70,9 +70,6 @@ pub async fn work<F: NorFlash, B: StoredBytes<F>>(
             let textures = memory.table().map_or(0, |table| table.textures());
             handheld.learned(learned, textures);
         }
-        // the task with the finger does it
-        Job::Calibrate => {}
-        Job::TurnOver => {}
     }
 }
 

@@ -5,8 +5,6 @@ use heapless::Vec;
 use super::guidance::{Again, Phase, View, Way};
 use super::spelling::{Place, WHEEL};
 use crate::explorer::LEADING;
-use crate::rig::turning::Turned;
-use crate::rig::weigh::ForceScale;
 use crate::table::Name;
 
 /// Entries of a list that are shown at once.
@@ -179,10 +177,6 @@ pub enum Screen<'a> {
     Fault(&'a Trouble),
     /// The probe.
     About(About),
-    /// The force scale that was set by weights, or the reason why not.
-    Calibrated(Result<ForceScale, &'a str>),
-    /// The scale of the accelerometer that was turned over, or the reason why not.
-    Turned(Result<Turned, &'a str>),
     /// Nothing: the display is off.
     Dark,
 }

@@ -19,8 +19,6 @@ use super::touch::Touch;
 use crate::dsp::Plan;
 use crate::explorer::LEADING;
 use crate::features::Observation;
-use crate::rig::turning::Turned;
-use crate::rig::weigh::ForceScale;
 use crate::sensor::pressure::Pressure;
 use crate::table::{Name, Table};
 
@@ -52,10 +50,6 @@ pub enum Job {
     },
     /// Learn the episode that was judged last as this texture, and call [`Handheld::learned`].
     Teach(Choice),
-    /// Set the force by weights, and call [`Handheld::calibrated`].
-    Calibrate,
-    /// Turn the accelerometer over, and call [`Handheld::turned`].
-    TurnOver,
 }
 
 /// The slide that the host wants.
@@ -107,10 +101,6 @@ enum Page {
     Learned(Result<Name, &'static str>),
     Fault(Trouble),
     About,
-    /// The force scale, or the reason why not.
-    Calibrated(Result<ForceScale, &'static str>),
-    /// The scale of the accelerometer, or the reason why not.
-    Turned(Result<Turned, &'static str>),
     Dark,
 }
 
@@ -134,7 +124,6 @@ pub struct Handheld<'p> {
     /// The go / no-go output is to be set.
     go: Option<bool>,
     textures: u16,
-    pub(super) turns: bool,
     job: Option<Job>,
     melody: &'static [Note],
     note: u8,
@@ -168,7 +157,6 @@ impl<'p> Handheld<'p> {
             reference: None,
             go: None,
             textures,
-            turns: false,
             job: None,
             melody: &[],
             note: 0,
@@ -293,11 +281,10 @@ impl<'p> Handheld<'p> {
             | Page::Lift
             | Page::Air
             | Page::Weigh(_)
+            | Page::Turn(_)
             | Page::Again(_)
             | Page::Thinking
             | Page::Verdict => true,
-            Page::Turn(_) => true,
-            Page::Turned(_) => false,
             // it may come back
             Page::Fault(trouble) => !matches!(trouble, Trouble::Memory(_)),
             Page::Choose(..)
@@ -305,7 +292,6 @@ impl<'p> Handheld<'p> {
             | Page::Saving
             | Page::Learned(_)
             | Page::About
-            | Page::Calibrated(_)
             | Page::Dark => false,
         }
     }
@@ -410,9 +396,7 @@ impl<'p> Handheld<'p> {
             Page::Learned(learned) => Screen::Learned(learned.as_ref().map_err(|why| *why)),
             Page::Fault(trouble) => Screen::Fault(trouble),
             Page::About => Screen::About(about.clone()),
-            Page::Calibrated(done) => Screen::Calibrated(*done),
             Page::Turn(over) => Screen::Turn { over: *over },
-            Page::Turned(done) => Screen::Turned(*done),
             Page::Dark => Screen::Dark,
         }
     }
@@ -435,7 +419,6 @@ impl<'p> Handheld<'p> {
             list,
             judgement: self.judgement.as_ref(),
             textures: self.textures,
-            turns: self.turns,
         }
     }
 

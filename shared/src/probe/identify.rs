@@ -60,7 +60,11 @@ where
         if let ExplorationStep::Measured(_, measurement, _) = step {
             clipped(measurement).map(&mut tell);
         }
-        if let Some(event) = event(&step, table, &config, slide) {
+        if let ExplorationStep::Rejected(_, why) = step {
+            let why = Failure::Slide(*why);
+            tell(Event::Rejected { slide, why });
+        }
+        if let Some(event) = event_of(&step, table, &config, slide) {
             tell(event);
         }
         if let ExplorationStep::Measured(..) = step {
@@ -90,9 +94,10 @@ pub(super) fn clipped(slide: &Measurement) -> Option<Event> {
     Some(Event::Trouble(Failure::Slide(why)))
 }
 
-/// The event of a step of the exploration, in which this slide is the next or has just been made.
-fn event(
-    step: &ExplorationStep<'_, RigError>,
+/// The event of a step of an exploration, in which this slide is the next or has just been made; none of a rejected
+/// slide, whose reason is the rig's.
+pub fn event_of<E>(
+    step: &ExplorationStep<'_, E>,
     table: Table<'_>,
     config: &Config,
     slide: u8,
@@ -112,10 +117,7 @@ fn event(
             posterior: Vec::from_slice(posterior).unwrap_or_default(),
         },
         ExplorationStep::Verified(now, slides) => Event::Verified { slides, now },
-        ExplorationStep::Rejected(_, why) => Event::Rejected {
-            slide,
-            why: Failure::Slide(*why),
-        },
+        ExplorationStep::Rejected(..) => return None,
         // whether it is the one asked for was told after the slide
         ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) if config.verify => {
             return None;

@@ -10,7 +10,6 @@ use sha2::{Digest as _, Sha256};
 use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::data::recordings::{RecordingError, RecordingSet};
 use tactus_lab::eval::experiment::Experiment;
-use tactus_study::fabricslide::FabricSet;
 
 /// Between manifest and file.
 pub(crate) const RULE: &[u8] = b"\n---\n";
@@ -64,7 +63,7 @@ fn read(data: &[u8]) -> Result<(), String> {
     };
     fs::write(path.join("a.npy"), file).expect("a file in RAM");
     fs::write(path.join("a.gz"), packed).expect("a file in RAM");
-    match kind % 4 {
+    match kind % 3 {
         0 => {
             manifest_is("manifest.csv");
             opened(path).map_err(|e| e.to_string())
@@ -73,15 +72,11 @@ fn read(data: &[u8]) -> Result<(), String> {
             manifest_is("manifest.json");
             opened(path).map_err(|e| e.to_string())
         }
-        2 => {
+        _ => {
             let file = manifest_is("properties.csv");
             let table = PropertyTable::read(&file).map_err(|e| e.to_string())?;
             let experiment = Experiment::given(&table, None, 1);
             experiment.map(drop).map_err(|e| e.to_string())
-        }
-        _ => {
-            manifest_is("manifest.json");
-            FabricSet::open(path).map(drop).map_err(|e| e.to_string())
         }
     }
 }
@@ -164,23 +159,6 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
 "sha256_gz":"PACKED_HASH","sha256_raw":"HASH"}]}"#;
     let properties = "texture,movement,trial,set,traction,roughness,fineness\n1,1,1,train,0.5,3.2,5.1\n\
         1,1,2,train,0.6,3.1,5.2\n2,1,1,train,0.9,2.2,4.1\n2,1,2,train,0.8,2.4,4.0\n1,1,1,validate,0.5,3.2,5.1\n";
-    let movements =
-        [120, 150, 180].map(|setpoint| [10, 20, 50, 100, 120].map(|mm_s| (setpoint, mm_s)));
-    let twice = movements
-        .as_flattened()
-        .iter()
-        .flat_map(|movement| [(0, movement), (1, movement)]);
-    let recordings = twice.zip(0..).map(|((rep, (setpoint, mm_s)), number)| {
-        format!(
-            r#"{{"pressure_setpoint":{setpoint},"speed_mm_s":{mm_s},"direction":-1,
-"rep":{rep},"n":72,"offset_values":{}}}"#,
-            number * 72 * 16
-        )
-    });
-    let fabrics = format!(
-        r#"{{"files":[{{"file":"a.gz","fabric":"A","sha256_gz":"PACKED_HASH","sha256_raw":"HASH","slides":[{}]}}]}}"#,
-        recordings.collect::<Vec<_>>().join(","),
-    );
     let wave = |n: usize| -> Vec<u8> {
         (0..n)
             .flat_map(|i| ((i * 37 % 100) as i16).to_le_bytes())
@@ -196,7 +174,6 @@ pub(crate) fn seeds() -> Vec<Vec<u8>> {
         (0u8, own.as_str(), npy),
         (1, biotac, wave(2 * 240)),
         (2, properties, Vec::new()),
-        (3, &fabrics, wave(30 * 72 * 16)),
     ]
     .into_iter()
     .map(|(kind, manifest, file)| [&[kind], manifest.as_bytes(), RULE, &file].concat())

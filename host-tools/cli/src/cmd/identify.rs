@@ -1,6 +1,6 @@
 //! `tactus identify`: an exploration shown step by step, on recordings and on the simulated rig.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use tactus_core::dsp::Plan;
 use tactus_core::explorer::{self, Config, Explorer};
+use tactus_core::probe::event_of;
 use tactus_core::probe::explore::{ExplorationStep, ExploreError, Rejection, explore};
 use tactus_core::rig::Rig;
 use tactus_core::table::{MAX_TEXTURES, Table};
@@ -285,47 +286,53 @@ where
     let mut explorer = Explorer::<MAX_TEXTURES>::new(table, rig.measures(), config)?;
     out.flush()?;
     let mut slides = Transcript::default();
-    let is_text = args.format == Format::Text;
-    let mut show = Show::new(table, out);
+    let mut nowhere = io::sink();
+    let out: &mut dyn Write = match args.format {
+        Format::Text => out,
+        Format::Json => &mut nowhere,
+    };
+    let (mut show, mut shown) = (Show::new(table, out), Ok(()));
     let verdict = embassy_futures::block_on(explore(
         rig,
         &mut explorer,
         &Plan::new(),
         || random.next_u32(),
-        |event| {
-            slides.step(&event, table);
-            presented.exploration.step(&event);
-            match event {
+        |step| {
+            let line = match &step {
+                ExplorationStep::Rejected(_, why) => {
+                    slides.rejected(why);
+                    show.line(&format!("  rejected: {why}"))
+                }
                 // shown below: recordings that run out are no failure
-                ExplorationStep::CutShort(..) => {}
-                event if is_text => show.step(event),
-                _ => {}
-            }
+                ExplorationStep::Decided { .. } | ExplorationStep::CutShort(..) => Ok(()),
+                step => event_of(step, table, &config, 0).map_or(Ok(()), |event| {
+                    slides.event(&event, table);
+                    presented.exploration.event(&event);
+                    show.event(&event)
+                }),
+            };
+            shown = std::mem::replace(&mut shown, Ok(())).and(line);
         },
     ));
+    shown?;
     let mut recordings_ran_out = false;
     let verdict = match verdict {
         Err(ExploreError::Rejected(Rejection::Rig(why)))
             if ran_out(&why) && explorer.slides() > 0 =>
         {
-            if is_text {
-                show.line("\nThe recordings have run out, and none counts twice.")?;
-            }
+            show.line("\nThe recordings have run out, and none counts twice.")?;
             recordings_ran_out = true;
             explorer.best()
         }
         Err(why) => {
-            if is_text && explorer.slides() > 0 {
-                let known = (&explorer.best(), explorer.slides());
-                show.step::<R::Error>(ExplorationStep::CutShort(known.0, known.1));
+            if explorer.slides() > 0 {
+                show.answer(explorer.best(), explorer.slides())?;
             }
             return Err(why.into());
         }
         Ok(verdict) => verdict,
     };
-    if is_text {
-        show.finish(verdict, explorer.slides(), truth)?;
-    }
+    show.finish(verdict, explorer.slides(), truth)?;
     Ok(Identification {
         presented: truth.to_owned(),
         known: table.find(truth).is_some(),

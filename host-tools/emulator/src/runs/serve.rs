@@ -11,7 +11,6 @@ use tactus_world::printer::{Kind, Printer};
 use super::identify::print_log;
 use crate::board::{Emulator, Options};
 use crate::host::args::World;
-use crate::host::arm::{ArmPort, mount};
 use crate::host::learned::Chosen;
 
 /// What is served, and where.
@@ -22,13 +21,9 @@ pub(crate) struct Args {
     /// TCP port of this PC; 0 is any free one
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
-    /// Put the finger on a simulated arm, which a program moves through this TCP port of this PC; 0 is any free one.
-    /// For the firmware `tactus-arm`
-    #[arg(long, value_name = "N")]
-    arm_port: Option<u16>,
     /// Put the finger on a simulated 3D printer, whose line of G-code is this TCP port of this PC; 0 is any free one.
     /// For the firmware `tactus-arm`
-    #[arg(long, value_name = "N", conflicts_with = "arm_port")]
+    #[arg(long, value_name = "N")]
     printer_port: Option<u16>,
     /// Its firmware
     #[arg(long, value_enum, default_value_t = PrinterFirmware::Marlin)]
@@ -102,7 +97,6 @@ pub(super) struct Served {
     pub(super) board: Emulator,
     pub(super) serial: TcpLine,
     pub(super) printer: Option<TcpLine>,
-    arm: Option<ArmPort>,
     began: Instant,
     log: bool,
 }
@@ -113,7 +107,6 @@ impl Served {
             board,
             serial,
             printer: None,
-            arm: None,
             began: Instant::now(),
             log,
         }
@@ -130,9 +123,6 @@ impl Served {
     pub(super) fn step(&mut self) -> anyhow::Result<()> {
         let board = &mut self.board;
         board.run_ms(STEP_MS)?;
-        if let Some(arm) = &mut self.arm {
-            arm.look(board);
-        }
         let said: Vec<u8> = board.received().into_iter().map(|(_, byte)| byte).collect();
         let came = self.serial.exchange(&said)?;
         board.send(&came);
@@ -168,12 +158,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         .unknown
         .start(&world.firmware.elf, Options::default())?;
     let mut served = Served::new(board, serial, world.log);
-    if let Some(port) = args.arm_port {
-        mount(&mut served.board, world.seed);
-        let bound = ArmPort::bind(port).map_err(|why| in_use(port, &why))?;
-        println!("arm at {}", bound.address()?);
-        served.arm = Some(bound);
-    }
     if let Some(port) = args.printer_port {
         let line = TcpLine::bind(port)?;
         println!("printer at {}", line.address()?);

@@ -10,11 +10,11 @@ use tactus_core::wire::{
     self, Command, Event, Identify, MAX_FRAME, Report, Request as Frame, Verdict,
 };
 use tactus_emulator::board::{Emulator, Options};
-use tactus_emulator::host::arm::mount;
 use tactus_emulator::host::talk::{Talk, TalkError};
 use tactus_emulator::host::under_finger::mounted;
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_link::Request;
+use tactus_world::arm::Arm;
 use tactus_world::arm_program::{ArmProgram, Misbehaves};
 
 use crate::common::elf_of;
@@ -36,7 +36,7 @@ struct OnTheLine {
 impl OnTheLine {
     /// A program that waits for orders; the finger is put on its arm.
     fn new(board: &mut Emulator, seed: u64) -> Self {
-        mount(board, seed);
+        board.rig().world().mount_on(Arm::new(seed));
         Self {
             program: ArmProgram::new(seed),
             id: FIRST_ID,

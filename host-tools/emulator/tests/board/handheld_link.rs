@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::sensor::FingerName;
 use tactus_core::table::{Name, Table};
 use tactus_core::wire::{Command, Event, Forget, Identify, Phase, Prompt, Report, Status};
@@ -20,8 +19,6 @@ use tactus_world::world::Setup;
 use crate::common::elf_of;
 use crate::person::Person;
 
-/// Longest exploration or training by hand, virtual seconds.
-const LONG_S: f64 = 120.0;
 const BURLAP: u8 = 101;
 
 /// A handheld probe over a texture of the world that its own table is learned from, and the person who holds it.
@@ -88,28 +85,6 @@ impl Held {
         self.talk.board().press(false).unwrap();
         // a button that bounces is looked at for 30 ms
         self.talk.board().run_ms(60).unwrap();
-    }
-
-    /// Presses the button on and off again.
-    pub(crate) fn click(&mut self) {
-        self.press_for(100);
-    }
-
-    /// Takes an entry of the menu, so many behind the first.
-    pub(crate) fn take(&mut self, entry: &str, number: u32) {
-        self.take_of(entry, number, 4);
-    }
-
-    /// The same in a menu of so many.
-    pub(crate) fn take_of(&mut self, entry: &str, number: u32, entries: u32) {
-        self.click();
-        self.until("the menu", 1.0, |board| shows(board, "Menu"));
-        (0..number).for_each(|_| self.click());
-        let place = format!("{} of {entries}", number + 1);
-        self.until(entry, 1.0, |board| {
-            shows(board, entry) && shows(board, &place)
-        });
-        self.press_for(700);
     }
 
     /// The person begins an episode.
@@ -288,53 +263,10 @@ fn a_link_that_is_cut_leaves_a_probe_that_works() {
     held.end();
 }
 
-/// The force that the handheld tells is the one that the hand presses with.
-fn half_a_newton_is_half_a_newton(held: &mut Held) {
-    let found = held
-        .run(Request::identify(Identify::default()), LONG_S)
-        .unwrap();
-    assert_eq!(found.verdict.name, "Burlap");
-    let forces = held.reports.iter().filter_map(|report| match report.event {
-        Event::Live(live) => Some(live.force_mn),
-        _ => None,
-    });
-    let most = forces.max().unwrap();
-    assert!((450..600).contains(&most), "{most}");
-}
-
-/// Nobody is at the other end of the cable: the display asks, a person lays weights on the finger.
+/// A finger with an accelerometer is turned over.
 #[test]
 #[ignore = "long"]
-fn the_force_is_set_on_its_own_screen() {
-    let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
-        return;
-    };
-    let mut held = Held::with(&elf, "burlap", Manner::default(), None);
-    held.take("about this probe", 1);
-    held.until("its day", 1.0, |board| shows(board, "never"));
-    held.press_for(100);
-    held.until("ready", 5.0, |board| shows(board, "and hold"));
-    held.take("set the force", 2);
-    held.until("the first weight", 10.0, |board| shows(board, "30 g"));
-    held.until("the end", 90.0, |board| shows(board, "Force is set"));
-    held.press_for(100);
-    held.until("ready", 5.0, |board| shows(board, "and hold"));
-    let store = held.talk.board().store().unwrap();
-    drop(held);
-    let mut held = Held::with(&elf, "burlap", Manner::default(), Some(store));
-    assert_eq!(held.status().calibrated, RigCalibration::UNDATED);
-    held.take("about this probe", 1);
-    held.until("its day", 1.0, |board| shows(board, "day unknown"));
-    held.press_for(100);
-    held.until("ready", 5.0, |board| shows(board, "and hold"));
-    half_a_newton_is_half_a_newton(&mut held);
-    held.end();
-}
-
-/// A finger with an accelerometer is turned over: no computer, and then one.
-#[test]
-#[ignore = "long"]
-fn a_finger_is_turned_over_on_its_own_screen_and_for_a_host() {
+fn a_finger_is_turned_over_for_a_host() {
     let Some(elf) = elf_of("TACTUS_HANDHELD_ELF") else {
         return;
     };
@@ -352,25 +284,7 @@ fn a_finger_is_turned_over_on_its_own_screen_and_for_a_host() {
     rig.world().break_part(off);
     rig.world().hand().unwrap().lean(0.02);
     drop(rig);
-    held.take_of("turn it over", 3, 5);
-    held.until("the first way", 5.0, |board| shows(board, "Point it"));
-    held.until("the other way", 20.0, |board| shows(board, "Turn it"));
-    held.until("the end", 20.0, |board| shows(board, "Turned over"));
-    held.press_for(100);
-    held.until("ready", 5.0, |board| shows(board, "and hold"));
-    let store = held.talk.board().store().unwrap();
-    drop(held);
-    let mut held = Held::of(&elf, setup, Manner::default(), Some(store));
-    let kept = held.run(Request::read_calibration(), TIMEOUT_S).unwrap();
-    assert_eq!(kept.turned, RigCalibration::UNDATED);
     let g_counts = 1.03e3 / 0.976;
-    let share = 1e3 / kept.pressure.pac_pa_per_count / g_counts;
-    assert!((share - 1.0).abs() < 0.005, "{share}");
-    // the same for a host, which tells more
-    let mut rig = held.talk.board().rig();
-    rig.world().break_part(off);
-    rig.world().hand().unwrap().lean(0.02);
-    drop(rig);
     let turned = held.run(Request::turn_over(), TIMEOUT_S).unwrap();
     assert!(
         (turned.g_counts / g_counts - 1.0).abs() < 0.005,

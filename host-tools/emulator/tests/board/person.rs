@@ -13,21 +13,6 @@ const LIFT: &str = "Lift";
 const WEIGH: &str = "Put on";
 const POINT: &str = "Point it";
 const TURN: &str = "Turn it";
-/// Weights that a person has at hand, as the display names them, mN; one that ends as another comes before it.
-const WEIGHTS: [(&str, u16); 5] = [
-    ("150 g", 1471),
-    ("120 g", 1177),
-    ("90 g", 883),
-    ("60 g", 588),
-    ("30 g", 294),
-];
-
-/// The weight that the display asks for, if the person has it.
-fn weight(shows: impl Fn(&str) -> bool) -> Option<u16> {
-    let mut weights = WEIGHTS.into_iter();
-    weights.find_map(|(grams, mn)| shows(grams).then_some(mn))
-}
-
 /// The person's action, and its end, ns.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum At {
@@ -78,8 +63,7 @@ impl Person {
         self.at == At::Idle
     }
 
-    /// Takes a report of the probe to its host: the weight to put on the finger, if it is one that a person does not
-    /// have at hand.
+    /// Takes a report of the probe to its host: the weight to put on the finger.
     pub(crate) fn hear(&mut self, report: &Report) {
         if let Event::Prompt(prompt) = report.event {
             self.weight = match prompt {
@@ -108,8 +92,8 @@ impl Person {
             shows(POINT).then_some(false)
         };
         let (at, intent) = match self.at {
-            At::Idle if shows(WEIGH) && weight(shows).or(self.weight).is_some() => {
-                let mn = weight(shows).or(self.weight).unwrap_or(0);
+            At::Idle if shows(WEIGH) && self.weight.is_some() => {
+                let mn = self.weight.unwrap_or(0);
                 (At::Weighing, Some((f64::from(mn) * 1e-3, 0.0)))
             }
             At::Idle if shows(PRESS) && !shows(LIFT) => (At::Pressing, Some((FORCE_N, 0.0))),

@@ -1,6 +1,5 @@
 //! A kitchen scale's weights on a rig's lifted finger, as `device calibrate --weights` asks for them.
 
-use tactus_core::handheld::weights::WEIGHTS_MN;
 use tactus_core::rig::weigh::ForceScale;
 use tactus_core::sensor::FingerName;
 use tactus_core::wire::{Event, Prompt, Report};
@@ -9,6 +8,9 @@ use tactus_emulator::host::talk::{TIMEOUT_S, Talk};
 use tactus_link::Request;
 use tactus_world::person::{Hand, Manner};
 use tactus_world::world::Setup;
+
+/// Weights as a kitchen scale shows them, 30, 60, 90, 120 and 150 g, as forces in mN.
+const WEIGHTS_MN: [u16; 5] = [294, 588, 883, 1177, 1471];
 
 use crate::common::{elf_of, ready};
 

@@ -3,8 +3,9 @@
 
 use tactus_core::explorer::{Config, VerdictKind};
 
-use crate::eval::evaluate::{EvaluateError, evaluate_by, play_with};
+use crate::eval::evaluate::{evaluate_by, play_with};
 use crate::eval::experiment::Experiment;
+use crate::eval::learn::TableError;
 
 /// The belief of an explorer after a slide.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -59,7 +60,7 @@ pub fn courses(
     config: Config,
     runs: u64,
     done: impl Fn() + Sync,
-) -> Result<Vec<Course>, EvaluateError> {
+) -> Result<Vec<Course>, TableError> {
     let config = Config {
         // never exceeded
         threshold: 1.0,

@@ -5,13 +5,13 @@ use std::collections::HashMap;
 use rand::{Rng as _, RngExt as _};
 use rayon::prelude::*;
 use serde::Serialize;
-use tactus_core::explorer::{self, Config, Explorer, ExplorerError, Strategy, VerdictKind};
+use tactus_core::explorer::{self, Config, Explorer, Strategy, VerdictKind};
 use tactus_core::features::PropertySet;
 use tactus_core::rig::MAX_REJECTED;
-use tactus_core::table::{Action, MAX_TEXTURES, Table, TableError};
+use tactus_core::table::{Action, MAX_TEXTURES, Table};
 
 use crate::eval::experiment::{Experiment, Run};
-use crate::eval::learn;
+use crate::eval::learn::TableError;
 
 /// The method of a run: its comparison and its choice of movements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
@@ -98,20 +98,6 @@ impl Outcome {
     }
 }
 
-/// Reasons why an evaluation fails.
-#[derive(Debug, thiserror::Error)]
-pub enum EvaluateError {
-    /// The table cannot be learned.
-    #[error(transparent)]
-    Learn(#[from] learn::TableError),
-    /// The table cannot be read back.
-    #[error("the table that was learned does not read back; please report this")]
-    Table(#[from] TableError),
-    /// The table cannot be explored.
-    #[error("the table cannot be explored")]
-    Explorer(#[from] ExplorerError),
-}
-
 /// Plays one run to its end.
 pub fn play<const N: usize>(
     explorer: &mut Explorer<'_, N>,
@@ -196,7 +182,7 @@ pub fn evaluate(
     config: Config,
     runs: u64,
     done: impl Fn() + Sync,
-) -> Result<Vec<Outcome>, EvaluateError> {
+) -> Result<Vec<Outcome>, TableError> {
     evaluate_by(experiment, config, runs, done, |explorer, run| {
         play(explorer, config.strategy, run)
     })
@@ -209,7 +195,7 @@ pub(super) fn evaluate_by<T: Send>(
     runs: u64,
     done: impl Fn() + Sync,
     play: impl Fn(&mut Explorer<'_, MAX_TEXTURES>, Run<'_>) -> T + Sync,
-) -> Result<Vec<T>, EvaluateError> {
+) -> Result<Vec<T>, TableError> {
     let learn = |run| experiment.run(run).learn(config.method);
     let run = |explorer: &mut Explorer<'_, MAX_TEXTURES>, index| {
         let outcome = play(explorer, experiment.run(index));
@@ -241,7 +227,7 @@ pub(super) fn evaluate_by<T: Send>(
         let played = runs.map(|index| run(&mut explorer, index));
         Ok(played.collect())
     });
-    let played: Result<Vec<Vec<T>>, EvaluateError> = played.collect();
+    let played: Result<Vec<Vec<T>>, TableError> = played.collect();
     Ok(played?.into_iter().flatten().collect())
 }
 
@@ -253,7 +239,7 @@ pub fn explorer<'b>(
     measured: PropertySet,
     config: Config,
     candidates: Option<&[u16]>,
-) -> Result<Box<Explorer<'b, MAX_TEXTURES>>, EvaluateError> {
+) -> Result<Box<Explorer<'b, MAX_TEXTURES>>, TableError> {
     let table = Table::read(bytes)?;
     Ok(Box::new(match candidates {
         Some(candidates) => Explorer::among(table, measured, config, candidates.iter().copied())?,

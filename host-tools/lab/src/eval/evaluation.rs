@@ -6,9 +6,10 @@ use tactus_core::table::OpenSet;
 
 use crate::eval::courses::courses;
 use crate::eval::evaluate::{
-    EvaluateError, Method, Outcome, Summary, evaluate, evaluate_by, is_right_at_once, play,
+    Method, Outcome, Summary, evaluate, evaluate_by, is_right_at_once, play,
 };
 use crate::eval::experiment::Experiment;
+use crate::eval::learn::TableError;
 use crate::eval::reliability::{Statements, statements};
 use crate::eval::verdicts::{Updates, Verdicts};
 
@@ -74,15 +75,15 @@ pub struct EvaluationRequest {
 }
 
 /// A part of the work: it calls the function that it gets after every run.
-pub type Stage<'s> = dyn FnMut(&(dyn Fn() + Sync)) -> Result<(), EvaluateError> + 's;
+pub type Stage<'s> = dyn FnMut(&(dyn Fn() + Sync)) -> Result<(), TableError> + 's;
 
 /// Plays the explorations. `stage` gets the number of each stage, how many there are, and its work, which it has to do.
 /// Gives the courses behind [`Evaluation::reliability`], too.
 pub fn evaluation(
     experiment: Experiment,
     request: &EvaluationRequest,
-    mut stage: impl FnMut([u32; 2], &mut Stage<'_>) -> Result<(), EvaluateError>,
-) -> Result<(Evaluation, Vec<Course>), EvaluateError> {
+    mut stage: impl FnMut([u32; 2], &mut Stage<'_>) -> Result<(), TableError>,
+) -> Result<(Evaluation, Vec<Course>), TableError> {
     let EvaluationRequest {
         config,
         runs,

@@ -1,53 +1,30 @@
 //! A table from the first slides of a folder of recordings: the work of `tactus learn`.
 
 use tactus_core::features::{FeatureSet, Movement, Observation};
-use tactus_core::table::EncodeError;
 
-use crate::data::recordings::{RecordingError, RecordingSet};
+use crate::data::recordings::RecordingSet;
 use crate::data::replay::MeasuredSlide;
 pub use crate::eval::enough::Enough;
 use crate::eval::enough::LEAST;
-use crate::eval::evaluate::{EvaluateError, Method};
+use crate::eval::evaluate::Method;
 use crate::eval::learn::{Expected, TableError, learn_for, name_finger};
 use crate::eval::learned::note_learned;
 use crate::eval::open_set::TaughtSlide;
 use crate::eval::samples::{note, of_all};
 use crate::eval::show::count;
 
-/// Reasons why a folder makes no table.
-#[derive(Debug, thiserror::Error)]
-pub enum FirstError {
-    /// A texture has too few slides.
-    #[error("{0}")]
-    Few(String),
-    /// The slides make no table.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// Its figures cannot be measured.
-    #[error(transparent)]
-    Figures(#[from] EvaluateError),
-    /// The recordings' notes of samples and finger do not fit into a table.
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
-    /// The slides cannot be compared.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-}
-
-impl FirstError {
-    /// So few slides of one texture and movement.
-    pub fn few(texture: &str, movement: Movement, there: usize) -> Self {
-        let there = count(there as u64, "slide");
-        Self::Few(format!(
-            "{texture}, {movement}: {there}; the spread of a texture's slides takes at least two"
-        ))
-    }
+/// So few slides of one texture and movement.
+pub fn few(texture: &str, movement: Movement, there: usize) -> TableError {
+    let there = count(there as u64, "slide");
+    TableError::Said(format!(
+        "{texture}, {movement}: {there}; the spread of a texture's slides takes at least two"
+    ))
 }
 
 /// Checks that there are enough slides to learn from.
-pub fn at_least_two(slides: usize) -> Result<(), FirstError> {
+pub fn at_least_two(slides: usize) -> Result<(), TableError> {
     if slides < 2 {
-        return Err(FirstError::Few(format!(
+        return Err(TableError::Said(format!(
             "--train-slides {slides}: the spread of a texture's slides takes at least two slides"
         )));
     }
@@ -59,7 +36,7 @@ pub fn at_least_two(slides: usize) -> Result<(), FirstError> {
 pub fn learned_textures(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
-) -> Result<Enough, FirstError> {
+) -> Result<Enough, TableError> {
     let (names, movements) = (set.names(), set.movements());
     let has = |texture: usize, movement| {
         let slides = measured.get(texture).into_iter().flatten();
@@ -70,7 +47,7 @@ pub fn learned_textures(
         let (name, movement) = (names.first(), movements.first());
         let none = (String::new(), Movement::UNKNOWN);
         let (name, movement) = (name.unwrap_or(&none.0), movement.unwrap_or(&none.1));
-        FirstError::few(name, *movement, most(movement))
+        few(name, *movement, most(movement))
     })
 }
 
@@ -80,7 +57,7 @@ pub fn taught(
     set: &RecordingSet,
     measured: &[Vec<MeasuredSlide>],
     slides: usize,
-) -> Result<Vec<Vec<Vec<TaughtSlide>>>, FirstError> {
+) -> Result<Vec<Vec<Vec<TaughtSlide>>>, TableError> {
     let Enough {
         textures,
         movements,
@@ -108,7 +85,7 @@ pub fn learn_first(
     method: Method,
     features: Option<FeatureSet>,
     expected: &Expected,
-) -> Result<Vec<u8>, FirstError> {
+) -> Result<Vec<u8>, TableError> {
     at_least_two(slides)?;
     let Enough {
         textures,

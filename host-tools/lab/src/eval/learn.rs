@@ -12,6 +12,8 @@ use tactus_core::table::{
 };
 use tactus_link::for_probe;
 
+use crate::data::recordings::RecordingError;
+
 use super::basis::{best_features, length};
 use super::calibrate::limits;
 use super::learned;
@@ -20,7 +22,7 @@ use super::pace;
 /// Three sections, whose lengths are numbers of 16 bits.
 const MOST_SECTIONS: usize = 3 * (4 + u16::MAX as usize);
 
-/// Reasons why slides do not make a table.
+/// Reasons why slides make no table, or one cannot be explored.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// The table cannot be written.
@@ -31,20 +33,24 @@ pub enum TableError {
         "the features cannot be whitened; learn from more slides, or with --features of a smaller set"
     )]
     Whiten(#[from] WhitenError),
-    /// A slide lacks features.
-    #[error("a slide of {texture} does not have {}; learn from other features", set.name())]
-    Features {
-        /// Name of the texture.
-        texture: String,
-        /// The features.
-        set: FeatureSet,
-    },
-    /// There is nothing to learn from.
-    #[error("there are no slides to learn from")]
-    Empty,
-    /// Its limits cannot be calibrated.
-    #[error("the table cannot be calibrated")]
-    Calibrate(#[from] ExplorerError),
+    /// The table cannot be explored.
+    #[error("the table cannot be explored")]
+    Explorer(#[from] ExplorerError),
+    /// The table cannot be read back.
+    #[error("the table that was learned does not read back; please report this")]
+    Table(#[from] table::TableError),
+    /// The slides cannot be compared.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A sentence.
+    #[error("{0}")]
+    Said(String),
+}
+
+impl TableError {
+    pub(crate) fn said(why: &str) -> Self {
+        Self::Said(why.to_owned())
+    }
 }
 
 /// Slides to learn from: per texture and movement.
@@ -259,7 +265,8 @@ fn learn_fused(
     slides: &Slides,
 ) -> Result<Vec<u8>, TableError> {
     let mut all = slides.iter().flatten().flatten();
-    all.next().ok_or(TableError::Empty)?;
+    all.next()
+        .ok_or_else(|| TableError::said("there are no slides to learn from"))?;
     let features = length(set, slides);
     // per texture and movement, the features of the slides
     let vectors = slides
@@ -273,9 +280,11 @@ fn learn_fused(
             row.iter()
                 .map(of)
                 .collect::<Option<Vec<Vec<Vector>>>>()
-                .ok_or_else(|| TableError::Features {
-                    texture: texture.clone(),
-                    set,
+                .ok_or_else(|| {
+                    let features = set.name();
+                    TableError::Said(format!(
+                        "a slide of {texture} does not have {features}; learn from other features"
+                    ))
                 })
         })
         .collect::<Result<Vec<_>, _>>()?;

@@ -10,8 +10,9 @@ use serde::Serialize;
 use tactus_core::explorer::{Config, VerdictKind};
 use tactus_core::table::OpenSet;
 
-use crate::eval::evaluate::{EvaluateError, explorer, play};
+use crate::eval::evaluate::{explorer, play};
 use crate::eval::experiment::{Experiment, Run};
+use crate::eval::learn::TableError;
 use crate::eval::verdicts::{Updates, Verdicts};
 
 /// Slides after which it is counted.
@@ -50,7 +51,7 @@ pub fn leave_one_out(
     config: Config,
     runs: u64,
     done: impl Fn() + Sync,
-) -> Result<Novelty, EvaluateError> {
+) -> Result<Novelty, TableError> {
     let mut experiment = experiment.clone();
     experiment.open_set = experiment.run(0).open_set(config.method, || ())?;
     let experiment = &experiment;
@@ -66,7 +67,7 @@ pub fn leave_one_out(
         if experiment.is_fixed() {
             lock().insert(out, Arc::clone(&learned));
         }
-        Ok::<_, EvaluateError>(learned)
+        Ok::<_, TableError>(learned)
     };
     let as_told = experiment.clone().each_slide_once();
     let open = Config {
@@ -90,13 +91,13 @@ pub fn leave_one_out(
                 let mut explorer = explorer(bytes, as_told.measured, open, None)?;
                 let outcome = play(&mut explorer, open.strategy, run);
                 let is_right = place(presented, out) == Some(outcome.identified);
-                Ok::<_, EvaluateError>((outcome.told, is_right, outcome.learns))
+                Ok::<_, TableError>((outcome.told, is_right, outcome.learns))
             };
             let told = [told(outs[0], &tables[0])?, told(outs[1], &tables[1])?];
             done();
             Ok(([new, known], told))
         })
-        .collect::<Result<_, EvaluateError>>()?;
+        .collect::<Result<_, TableError>>()?;
     let told = |which: usize, after: usize| {
         Verdicts::of(presented.iter().map(|(run, _)| run[which][after]))
     };
@@ -128,7 +129,7 @@ fn episode(
     run: &mut Run<'_>,
     out: usize,
     bytes: &[u8],
-) -> Result<[(VerdictKind, bool); SLIDES], EvaluateError> {
+) -> Result<[(VerdictKind, bool); SLIDES], TableError> {
     let mut explorer = explorer(bytes, experiment.measured, config, None)?;
     let place = place(run.unknown, out);
     let mut told = [(VerdictKind::Undecided, false); SLIDES];

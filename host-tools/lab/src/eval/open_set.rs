@@ -13,7 +13,7 @@ use tactus_core::explorer::{Config, VerdictKind};
 use tactus_core::features::Observation;
 use tactus_core::table::{Contents, EncodeError, OpenSet, Share, Table, with_open_set};
 
-use super::evaluate::{EvaluateError, Method, Outcome, explorer, play};
+use super::evaluate::{Method, Outcome, explorer, play};
 use super::experiment::Experiment;
 use super::learn::{Expected, TableError, learn_for, measured};
 use super::verdicts::Verdicts;
@@ -72,7 +72,7 @@ pub fn with_figures(
     expected: &Expected,
     taught: &Taught,
     done: impl Fn() + Sync,
-) -> Result<Vec<u8>, EvaluateError> {
+) -> Result<Vec<u8>, TableError> {
     match figures(Table::read(&bytes)?, expected, taught, done)? {
         Some(figures) => Ok(noted(&bytes, &figures).map_err(TableError::from)?),
         None => Ok(bytes),
@@ -100,7 +100,7 @@ pub(crate) fn figures(
     expected: &Expected,
     taught: &Taught,
     done: impl Fn() + Sync,
-) -> Result<Option<OpenSet>, EvaluateError> {
+) -> Result<Option<OpenSet>, TableError> {
     let Contents::Fused(..) = table.contents() else {
         return Ok(None);
     };
@@ -117,7 +117,7 @@ pub(crate) fn figures(
         let known = (new + 1 + round % (textures - 1)) % textures;
         let told = told(table, expected, taught, [new, known], n as u64)?;
         done();
-        Ok::<_, EvaluateError>(told)
+        Ok::<_, TableError>(told)
     };
     let tables = (0..all).into_par_iter().panic_fuse();
     let told = tables.map(one).collect::<Result<Vec<_>, _>>()?;
@@ -144,7 +144,7 @@ fn told(
     taught: &Taught,
     [new, known]: [usize; 2],
     seed: u64,
-) -> Result<Vec<Outcome>, EvaluateError> {
+) -> Result<Vec<Outcome>, TableError> {
     let Contents::Fused(set, _) = table.contents() else {
         return Ok(Vec::new());
     };

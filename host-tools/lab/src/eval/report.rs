@@ -10,8 +10,9 @@ use tactus_core::table::{Contents, Table};
 
 use crate::data::replay::MeasuredSlide;
 use crate::eval::alike::{Alike, alike, nearest};
-use crate::eval::evaluate::{EvaluateError, Method, explorer, play};
+use crate::eval::evaluate::{Method, explorer, play};
 use crate::eval::experiment::Experiment;
+use crate::eval::learn::TableError;
 use crate::eval::learned::LeftOut;
 use crate::eval::samples;
 use crate::eval::show::{count, percent};
@@ -104,19 +105,6 @@ pub struct RecordedTexture {
     pub moved: Option<f64>,
 }
 
-/// Reasons why there is no report.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The table cannot be explored.
-    #[error(transparent)]
-    Evaluate(#[from] EvaluateError),
-    /// Nothing in common.
-    #[error(
-        "none of the recorded textures has slides at all movements of the table; record with this table on the probe"
-    )]
-    NothingToPlay,
-}
-
 /// Slides of a texture that is in the recordings.
 #[derive(Clone, Debug)]
 pub struct Slides {
@@ -133,7 +121,7 @@ impl Report {
         slides: Option<&[Slides]>,
         seed: u64,
         done: impl Fn() + Sync,
-    ) -> Result<Self, ReportError> {
+    ) -> Result<Self, TableError> {
         let textures = (0..table.textures()).map(|texture| TextureReport {
             name: table.name(texture).unwrap_or_default().to_owned(),
             trials: (0..)
@@ -208,7 +196,7 @@ impl Report {
         slides: &[Slides],
         seed: u64,
         done: impl Fn() + Sync,
-    ) -> Result<(), ReportError> {
+    ) -> Result<(), TableError> {
         let at = |texture: &Slides| -> Vec<Vec<Observation>> {
             let of = |movement| {
                 let same = texture
@@ -222,7 +210,10 @@ impl Report {
         let is_whole = |texture: &&Slides| at(texture).iter().all(|slides| !slides.is_empty());
         let whole: Vec<&Slides> = slides.iter().filter(is_whole).collect();
         if whole.is_empty() {
-            return Err(ReportError::NothingToPlay);
+            return Err(TableError::said(
+                "none of the recorded textures has slides at all movements of the table; record with this table on \
+                 the probe",
+            ));
         }
         let observed: Vec<_> = whole.iter().map(|texture| at(texture)).collect();
         let names: Vec<String> = whole.iter().map(|texture| texture.name.clone()).collect();

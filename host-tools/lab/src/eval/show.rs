@@ -1,11 +1,9 @@
 //! Explorations and tables for people to look at.
 
-use std::fmt::Display;
 use std::io::{self, Write};
 
 use tactus_core::explorer::{ExpectedOutcome, Verdict, VerdictKind};
 use tactus_core::features::{Properties, Property};
-use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Contents, Table, white};
 use tactus_core::wire::{Event, Prompt};
 
@@ -28,12 +26,10 @@ pub struct Show<'t, W> {
     slides: u32,
     prompt: Option<Prompt>,
     answered: Option<(Verdict, u8)>,
-    /// The first failure to write, kept until the end.
-    failed: io::Result<()>,
 }
 
 impl<'t, W: Write> Show<'t, W> {
-    /// Shows the explorer's steps with `table`.
+    /// Shows an exploration with `table`.
     pub fn new(table: Table<'t>, out: W) -> Self {
         Self {
             table,
@@ -41,31 +37,6 @@ impl<'t, W: Write> Show<'t, W> {
             slides: 0,
             prompt: None,
             answered: None,
-            failed: Ok(()),
-        }
-    }
-
-    /// Shows one step.
-    pub fn step<E: Display>(&mut self, event: ExplorationStep<'_, E>) {
-        if self.failed.is_ok() {
-            self.failed = self.try_step(event);
-        }
-    }
-
-    fn try_step<E: Display>(&mut self, event: ExplorationStep<'_, E>) -> io::Result<()> {
-        match event {
-            ExplorationStep::Chosen(action, expected) => self.chosen(action, expected),
-            ExplorationStep::Measured(action, measurement, posterior) => self.slide_report(
-                action,
-                &measurement.properties,
-                measurement.roughness_is_bound,
-                posterior,
-            ),
-            ExplorationStep::Early(ms) => self.early(ms),
-            ExplorationStep::Rejected(_, why) => self.line(&format!("  rejected: {why}")),
-            // shown with the truth: see `finish`
-            ExplorationStep::Decided { .. } | ExplorationStep::Verified(..) => Ok(()),
-            ExplorationStep::CutShort(known, slides) => self.answer(*known, slides),
         }
     }
 
@@ -263,7 +234,6 @@ impl<'t, W: Write> Show<'t, W> {
 
     /// Shows the answer, and whether it is right.
     pub fn finish(mut self, verdict: Verdict, slides: u8, truth: &str) -> io::Result<()> {
-        std::mem::replace(&mut self.failed, Ok(()))?;
         self.answer(verdict, slides)?;
         match is_right(verdict, truth, self.table) {
             Some(true) => writeln!(self.out, "Right."),
@@ -272,7 +242,8 @@ impl<'t, W: Write> Show<'t, W> {
         }
     }
 
-    fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
+    /// Shows the answer.
+    pub fn answer(&mut self, verdict: Verdict, slides: u8) -> io::Result<()> {
         self.answered = Some((verdict, slides));
         let name = self.table.name(verdict.texture).unwrap_or("?");
         let p = verdict.probability * 100.0;

@@ -4,10 +4,9 @@ use std::fmt::Display;
 
 use serde::Serialize;
 use tactus_core::explorer::{ExpectedOutcome, Verdict, VerdictKind};
-use tactus_core::features::{Properties, Property};
-use tactus_core::probe::explore::ExplorationStep;
+use tactus_core::features::Property;
 use tactus_core::table::{Action, Table};
-use tactus_core::wire::Event;
+use tactus_core::wire::{Event, SlideReport};
 
 /// Textures less probable than this are left out of a slide's posterior.
 const LISTED: f32 = 1e-6;
@@ -86,81 +85,51 @@ impl Answer {
 }
 
 impl Transcript {
-    /// Takes a step of an exploration with `table`.
-    pub fn step<E: Display>(&mut self, event: &ExplorationStep<'_, E>, table: Table<'_>) {
-        match event {
-            ExplorationStep::Chosen(action, expected) => {
-                self.slides.push(SlideRecord::new(*action, expected, table));
-            }
-            ExplorationStep::Measured(_, measurement, posterior) => {
-                let bound = measurement.roughness_is_bound;
-                self.measured(&measurement.properties, bound, posterior, table);
-            }
-            ExplorationStep::Early(ms) => self.early(*ms),
-            ExplorationStep::Rejected(_, why) => self.rejected(why),
-            // the answer is beside the slides: see [`Answer`]
-            ExplorationStep::Decided { .. }
-            | ExplorationStep::Verified(..)
-            | ExplorationStep::CutShort(..) => {}
-        }
-    }
-
-    fn early(&mut self, ms: u16) {
-        if let Some(slide) = self.slides.last_mut() {
-            slide.ended_after_s = Some(f64::from(ms) / 1e3);
-        }
-    }
-
-    /// Takes a probe's event of an exploration with `table`; ignores any other.
+    /// Takes an event of an exploration with `table`; ignores any other.
     pub fn event(&mut self, event: &Event, table: Table<'_>) {
         match event {
             Event::Chosen {
                 action, expected, ..
             } => self.slides.push(SlideRecord::new(*action, expected, table)),
-            Event::Early(ms) => self.early(*ms),
+            Event::Early(ms) => {
+                if let Some(slide) = self.slides.last_mut() {
+                    slide.ended_after_s = Some(f64::from(*ms) / 1e3);
+                }
+            }
             Event::SlideReport {
                 observed,
                 posterior,
                 ..
-            } => {
-                let bound = observed.roughness_is_bound;
-                self.measured(&observed.properties(), bound, posterior, table);
-            }
+            } => self.measured(observed, posterior, table),
             Event::Rejected { why, .. } => self.rejected(why),
             _ => {}
         }
     }
 
-    fn rejected(&mut self, why: &impl Display) {
+    /// Notes why the last slide does not count.
+    pub fn rejected(&mut self, why: &impl Display) {
         if let Some(slide) = self.slides.last_mut() {
             slide.rejected = Some(why.to_string());
         }
     }
 
-    fn measured(
-        &mut self,
-        properties: &Properties,
-        bound: bool,
-        posterior: &[f32],
-        table: Table<'_>,
-    ) {
-        if let Some(slide) = self.slides.last_mut() {
-            slide.traction_n = properties.get(Property::Traction);
-            slide.roughness_ln = properties.get(Property::Roughness);
-            slide.roughness_is_bound = bound;
-            slide.fineness_ln = properties.get(Property::Fineness);
-            let candidates = table.names().zip(posterior);
-            slide.posterior = candidates
-                .filter(|(_, probability)| **probability >= LISTED)
-                .map(|(name, &probability)| Candidate {
-                    texture: name.to_owned(),
-                    probability,
-                })
-                .collect();
-            slide
-                .posterior
-                .sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        }
+    fn measured(&mut self, observed: &SlideReport, posterior: &[f32], table: Table<'_>) {
+        let Some(slide) = self.slides.last_mut() else {
+            return;
+        };
+        [slide.traction_n, slide.roughness_ln, slide.fineness_ln] = observed.properties;
+        slide.roughness_is_bound = observed.roughness_is_bound;
+        let candidates = table.names().zip(posterior);
+        let listed = candidates.filter(|(_, probability)| **probability >= LISTED);
+        slide.posterior = listed
+            .map(|(name, &probability)| Candidate {
+                texture: name.to_owned(),
+                probability,
+            })
+            .collect();
+        slide
+            .posterior
+            .sort_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 }
 

@@ -7,14 +7,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tactus_core::explorer::{Answer, Config, Explorer, Strategy};
 use tactus_core::features::{Vector, WHITE_STEPS};
-use tactus_core::table::{
-    Change, Contents, EncodeError, Table, Tally, TextureStats, Whitened, amend,
-};
+use tactus_core::table::{Change, Contents, Table, Tally, TextureStats, Whitened, amend};
 
 use crate::data::replay::MeasuredSlide;
-use crate::eval::evaluate::{EvaluateError, explorer};
+use crate::eval::evaluate::explorer;
 use crate::eval::experiment::{Experiment, Run};
-use crate::eval::learn;
+use crate::eval::learn::TableError;
 use crate::eval::learned::note_learned;
 
 /// Slides after which it is counted.
@@ -68,33 +66,13 @@ struct Episode {
     end: (Answer, usize),
 }
 
-/// Reasons why it was not evaluated.
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    /// As any evaluation.
-    #[error(transparent)]
-    Evaluate(#[from] EvaluateError),
-    /// The learned table has no limits.
-    #[error(
-        "tables of these slides have no limits: verification needs three textures at least, whitened features, and \
-         --method fused"
-    )]
-    NoLimits,
-}
-
-impl From<learn::TableError> for VerifyError {
-    fn from(why: learn::TableError) -> Self {
-        Self::Evaluate(why.into())
-    }
-}
-
 /// Compares slides of each texture in turn with its own reference and with those of others.
 pub fn verify(
     experiment: &Experiment,
     config: Config,
     runs: u64,
     done: impl Fn() + Sync,
-) -> Result<Verified, VerifyError> {
+) -> Result<Verified, TableError> {
     let experiment = experiment.clone().each_slide_once();
     let config = Config {
         // there is nothing to choose: every movement takes its turn
@@ -123,7 +101,7 @@ pub fn verify(
             done();
             episodes
         })
-        .collect::<Result<_, VerifyError>>()?;
+        .collect::<Result<_, TableError>>()?;
     let episodes: Vec<Episode> = episodes.into_iter().flatten().collect();
     let told = |same: bool| {
         let of: Vec<_> = episodes.iter().filter(|e| e.is_same == same).collect();
@@ -151,7 +129,7 @@ fn episode(
     config: Config,
     mut run: Run<'_>,
     reference: usize,
-) -> Result<Episode, VerifyError> {
+) -> Result<Episode, TableError> {
     let candidates = [reference as u16];
     let mut explorer = explorer(bytes, experiment.measured, config, Some(&candidates))?;
     let mut episode = Episode {
@@ -174,7 +152,12 @@ fn episode(
         explorer
             .observe(action, slide)
             .expect("every slide has the features that the table was learned from");
-        let verification = explorer.verification().ok_or(VerifyError::NoLimits)?;
+        let verification = explorer.verification().ok_or_else(|| {
+            TableError::said(
+                "tables of these slides have no limits: verification needs three textures at least, whitened \
+                 features, and --method fused",
+            )
+        })?;
         let after = episode
             .scores
             .iter_mut()
@@ -250,43 +233,29 @@ fn trade_off(own: &[f64], others: &[f64]) -> (f64, Vec<[f64; 2]>) {
     (equal, at_limits.into_iter().map(at).collect())
 }
 
-/// Reasons why a texture cannot be put into a table.
-#[derive(Debug, thiserror::Error)]
-pub enum PutError {
-    /// The table compares the paper's properties.
-    #[error(
-        "the table is of the paper's properties: give one that was learned with --method fused"
-    )]
-    NotFused,
-    /// A slide lacks features, or none is of a movement of the table.
-    #[error(
-        "the reference has no slide at a movement of the table with the features that it compares: record it with this \
-         table"
-    )]
-    NothingInCommon,
-    /// The table cannot be written.
-    #[error("the reference does not fit into the table")]
-    Encode(#[from] EncodeError),
-}
+const NOTHING_IN_COMMON: &str = "the reference has no slide at a movement of the table with the features that it \
+     compares: record it with this table";
 
 /// A table with one more texture, or another one of this name, that was learned from these slides.
-pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec<u8>, PutError> {
+pub fn put(table: Table<'_>, name: &str, slides: &[MeasuredSlide]) -> Result<Vec<u8>, TableError> {
     let Contents::Fused(set, length) = table.contents() else {
-        return Err(PutError::NotFused);
+        return Err(TableError::said(
+            "the table is of the paper's properties: give one that was learned with --method fused",
+        ));
     };
     let at = |(index, movement): (u8, _)| {
         let mut known = Whitened::default();
         for slide in slides.iter().filter(|slide| slide.movement == movement) {
             let features = slide.observation().vector(set, length.into());
             let white = features.and_then(|features| table.whiten(index, &features));
-            known.teach(&white.ok_or(PutError::NothingInCommon)?);
+            known.teach(&white.ok_or_else(|| TableError::said(NOTHING_IN_COMMON))?);
         }
         Ok(known)
     };
     let known = (0..).zip(table.movements()).map(at);
-    let known: Vec<Whitened> = known.collect::<Result<_, PutError>>()?;
+    let known: Vec<Whitened> = known.collect::<Result<_, TableError>>()?;
     if known.iter().all(|known| known.slides == 0) {
-        return Err(PutError::NothingInCommon);
+        return Err(TableError::said(NOTHING_IN_COMMON));
     }
     let mut bytes = vec![0; table.as_bytes().len() + MOST_OF_ONE];
     let change = Change::Put {
@@ -444,7 +413,7 @@ mod tests {
             .find(|m| with.movements().all(|n| n != *m))
             .unwrap();
         let nothing = put(table, "Reference", &[elsewhere]);
-        assert!(matches!(nothing, Err(PutError::NothingInCommon)));
+        assert_eq!(nothing.unwrap_err().to_string(), NOTHING_IN_COMMON);
     }
 
     #[test]

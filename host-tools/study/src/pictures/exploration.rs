@@ -1,8 +1,5 @@
 //! Picture of an exploration: the course of the posterior.
 
-use std::fmt::Display;
-
-use tactus_core::probe::explore::ExplorationStep;
 use tactus_core::table::{Action, Table};
 use tactus_core::wire::Event;
 
@@ -38,17 +35,7 @@ impl<'t> Exploration<'t> {
         self.table
     }
 
-    /// Takes a step of it.
-    pub fn step<E: Display>(&mut self, step: &ExplorationStep<'_, E>) {
-        if let ExplorationStep::Measured(action, _, posterior) = step {
-            self.slides.push(Counted {
-                action: *action,
-                posterior: posterior.to_vec(),
-            });
-        }
-    }
-
-    /// Takes a probe's event of it; ignores any other.
+    /// Takes an event of it; ignores any other.
     pub fn event(&mut self, event: &Event) {
         if let Event::SlideReport {
             action, posterior, ..

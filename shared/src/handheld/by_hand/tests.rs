@@ -2,14 +2,9 @@
 
 use super::*;
 use crate::dsp::Plan;
-use crate::handheld::weights::WEIGHTS_MN;
-use crate::probe::Memory;
 use crate::probe::explore::Random;
 use crate::rig::weigh::ForceScale;
-use crate::sensor::FingerCode;
 use crate::sensor::pressure::{Calibration, Channel, Counts};
-use crate::store::Store;
-use crate::store::tests::ram::{Ram, SECTOR};
 use crate::wire::Again;
 use embassy_futures::block_on;
 use std::string::{String, ToString as _};
@@ -317,126 +312,18 @@ fn weights_and_the_air_give_the_calibration_that_forces_are_shown_by() {
     assert_eq!(why, Failure::Rig(RigError::Stopped));
 }
 
-/// No stored table.
-struct Nothing;
-
-impl<F: NorFlash> StoredBytes<F> for Nothing {
-    fn finger(&self) -> FingerCode {
-        FingerCode::BIOTAC
-    }
-
-    fn bytes(&mut self, _: &mut Store<F>) -> Option<&[u8]> {
-        None
-    }
-}
-
 #[test]
-fn a_person_turns_the_finger_over_without_a_host_and_it_is_kept() {
+fn a_person_turns_the_finger_over_for_a_host() {
     let plan = Plan::new();
-    let store = block_on(Store::open(Ram::<SECTOR>::new())).unwrap();
-    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     let mut rig = held(&plan);
-    rig.serves = false;
     // 3 % less than the data sheet's, and 60 counts off
     rig.hand.g = (994.0, 60.0);
-    block_on(rig.set_gravity(&mut memory));
-    let set = rig.calibration();
-    let mg = set.pressure.pac_pa_per_count;
-    assert!((mg * 0.994 - 1.0).abs() < 1e-3, "{mg}");
-    assert_eq!(set.turned, RigCalibration::UNDATED);
-    // the force is the same as before
-    assert_eq!(set.scale_day(), None);
+    let turned = block_on(rig.turn_over()).unwrap();
+    assert!((turned.g_counts / 994.0 - 1.0).abs() < 1e-3, "{turned:?}");
+    assert!((turned.offset_counts - 60.0).abs() < 1.0, "{turned:?}");
     assert_eq!(prompts(&rig), [Prompt::Still, Prompt::TurnOver]);
-    let about = About::default();
-    let shown = |rig: &Held<'_>| std::format!("{:?}", rig.handheld.screen(None, &about));
-    assert!(shown(&rig).starts_with("Turned(Ok("), "{}", shown(&rig));
-    let flash = memory.close().0.unwrap().close().again();
-    let mut store = block_on(Store::open(flash)).unwrap();
-    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-
-    // 15 % less, and an offset that no sound part has
-    for g in [(870.0, 0.0), (1024.6, 300.0)] {
-        let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
-        rig.hand.g = g;
-        block_on(rig.set_gravity(&mut memory));
-        assert_eq!(rig.calibration(), set);
-        assert!(shown(&rig).contains("That is not 1 g"), "{}", shown(&rig));
-        let flash = memory.close().0.unwrap().close().again();
-        store = block_on(Store::open(flash)).unwrap();
-        assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-    }
     // it lies on its side until the wait is over
-    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
     rig.hand.g = (0.0, 0.0);
-    block_on(rig.set_gravity(&mut memory));
-    assert_eq!(rig.calibration(), set);
-    assert!(shown(&rig).contains("Nothing was still"), "{}", shown(&rig));
-}
-
-#[test]
-fn a_person_sets_the_force_by_weights_without_a_host_and_it_is_kept() {
-    let plan = Plan::new();
-    let store = block_on(Store::open(Ram::<SECTOR>::new())).unwrap();
-    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
-    let mut rig = held(&plan);
-    rig.serves = false;
-    // a host's request was stopped before
-    rig.hand.stops = Some(0);
-    rig.hand.mn_per_count = 14.0;
-    block_on(rig.set_force(&mut memory));
-    let set = rig.calibration();
-    let scale = set.pressure.force_mn_per_count;
-    assert!((scale - 14.0).abs() < 0.1, "{scale}");
-    assert!((set.pressure.pdc_no_contact - AIR).abs() < 0.2);
-    assert_eq!(set.scale_day(), Some(RigCalibration::UNDATED));
-    assert!(set.air_known);
-    let weights = prompts(&rig).into_iter().filter_map(|prompt| match prompt {
-        Prompt::Weigh(mn) => Some(mn),
-        _ => None,
-    });
-    assert_eq!(weights.collect::<List<_>>(), WEIGHTS_MN);
-    let about = About::default();
-    let shown = |rig: &Held<'_>| std::format!("{:?}", rig.handheld.screen(None, &about));
-    assert!(shown(&rig).starts_with("Calibrated(Ok("), "{}", shown(&rig));
-    // after a reset, too
-    let flash = memory.close().0.unwrap().close().again();
-    let mut store = block_on(Store::open(flash)).unwrap();
-    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-
-    // one weight is another than it should be: nothing is kept
-    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
-    rig.hand.wrong = Some(883);
-    block_on(rig.set_force(&mut memory));
-    assert_eq!(rig.calibration(), set);
-    assert!(
-        shown(&rig).starts_with("Calibrated(Err("),
-        "{}",
-        shown(&rig)
-    );
-    let flash = memory.close().0.unwrap().close().again();
-    let mut store = block_on(Store::open(flash)).unwrap();
-    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-    // a load cell that is wired the wrong way round: the first weight tells
-    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
-    rig.hand.wrong = None;
-    rig.hand.mn_per_count = -9.35;
-    rig.hand.told.clear();
-    block_on(rig.set_force(&mut memory));
-    assert_eq!(rig.calibration(), set);
-    assert!(
-        shown(&rig).contains("Swap the cell's wires"),
-        "{}",
-        shown(&rig)
-    );
-    assert!(!prompts(&rig).contains(&Prompt::Weigh(WEIGHTS_MN[1])));
-    rig.hand.mn_per_count = 14.0;
-    let flash = memory.close().0.unwrap().close().again();
-    let mut store = block_on(Store::open(flash)).unwrap();
-    assert_eq!(block_on(store.calibration()), Ok(Some(set)));
-    // a person who gives up is back at the start
-    let mut memory = Memory::new(Ok(store), Nothing, &[], &mut []);
-    rig.hand.gives_up = Some(rig.hand.ticks + 400);
-    block_on(rig.set_force(&mut memory));
-    assert_eq!(rig.calibration(), set);
-    assert!(!shown(&rig).starts_with("Calibrated"), "{}", shown(&rig));
+    let why = block_on(rig.turn_over()).unwrap_err();
+    assert_eq!(why, Failure::Rig(RigError::NobodyThere));
 }

@@ -11,8 +11,6 @@ use crate::handheld::jobs::words;
 use crate::handheld::picture::{HEIGHT, Picture, WIDTH};
 use crate::handheld::screen::LINES;
 use crate::handheld::spelling::Spelling;
-use crate::rig::turning::Turned;
-use crate::rig::weigh::ForceScale;
 use crate::store::StoreError;
 use crate::table::{Name, TableError};
 use crate::wire::MemoryError;
@@ -87,32 +85,10 @@ fn draw_touches(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
     each("weigh", &weigh);
     each("turn-down", &Screen::Turn { over: false });
     each("turn-over", &Screen::Turn { over: true });
-    let turned = Turned {
-        g_counts: 1041.3,
-        offset_counts: -38.0,
-    };
-    each("turned", &Screen::Turned(Ok(turned)));
-    let askew = Screen::Turned(Err("That is not 1 g. Hold it straight."));
-    each("turned-askew", &askew);
 }
 
 fn draw_verdicts(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
     each("thinking", &Screen::Thinking { slide: 2 });
-    for (name, done) in [
-        (
-            "force-set",
-            Ok(ForceScale {
-                mn_per_count: 11.37,
-                off_mn: 14.0,
-            }),
-        ),
-        (
-            "force-not-set",
-            Err("The weights do not agree. Weigh again."),
-        ),
-    ] {
-        each(name, &Screen::Calibrated(done));
-    }
     let sure = Screen::Verdict {
         rows: rows(&[
             row("bath towel", 0.9984),
@@ -200,21 +176,20 @@ fn draw_lists(each: &mut impl FnMut(&'static str, &Screen<'_>)) {
             wheel: wheel(37),
         },
     );
-    let list = |title, at, count, texts: [&'static str; 4]| Screen::Choose {
+    let list = |title, at, count, texts: &[&'static str]| Screen::Choose {
         title,
         at,
         count,
-        entries: texts.into_iter().map(Entry::Text).collect(),
+        entries: texts.iter().copied().map(Entry::Text).collect(),
     };
     let todo = [
         "is it the same as ..?",
         "about this probe",
-        "set the force",
         "nothing, go back",
     ];
-    each("menu", &list("Menu", 0, 4, todo));
+    each("menu", &list("Menu", 0, 3, &todo));
     let references = ["Burlap", "Cardboard", "Cork", "Felt"];
-    each("reference", &list("Same as", 102, 116, references));
+    each("reference", &list("Same as", 102, 116, &references));
     for (name, same, open, trials, other) in [
         ("compared-same", Some(true), false, 15, "Cork"),
         ("compared-different", Some(false), false, 2, LONG),

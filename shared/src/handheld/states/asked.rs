@@ -7,8 +7,6 @@ use crate::handheld::guidance::{Phase, View};
 use crate::handheld::judge::Judgement;
 use crate::handheld::screen::Trouble;
 use crate::handheld::touch::Taken;
-use crate::rig::turning::Turned;
-use crate::rig::weigh::ForceScale;
 use crate::rig::{self, Fault};
 use crate::table::Name;
 use crate::wire::Prompt;
@@ -98,33 +96,6 @@ impl<'p> Handheld<'p> {
         ) {
             self.begin();
         }
-    }
-
-    /// Takes the result of [`Job::Calibrate`](super::Job::Calibrate): the force per count, or the reason why it has not
-    /// changed, if there is one to show.
-    pub fn calibrated(&mut self, done: Result<ForceScale, Option<&'static str>>) {
-        self.release();
-        self.came_of(done, Page::Calibrated);
-    }
-
-    /// Takes the result of [`Job::TurnOver`](super::Job::TurnOver), in the same way.
-    pub fn turned(&mut self, done: Result<Turned, Option<&'static str>>) {
-        self.release();
-        self.came_of(done, Page::Turned);
-    }
-
-    fn came_of<T>(
-        &mut self,
-        done: Result<T, Option<&'static str>>,
-        page: impl Fn(Result<T, &'static str>) -> Page,
-    ) {
-        let (sound, done) = match done {
-            Ok(found) => (super::SURE_IT_IS, Ok(found)),
-            Err(Some(why)) => (super::BAD, Err(why)),
-            Err(None) => return,
-        };
-        self.sound(sound);
-        self.show(page(done));
     }
 
     /// Sets the contact force of a count of P_DC, mN.

@@ -40,8 +40,6 @@ impl List {
 pub(super) enum Entry {
     Compare,
     About,
-    SetForce,
-    TurnOver,
     Known(u16),
     Numbered,
     Spell,
@@ -54,7 +52,6 @@ pub(super) struct Entries<'j> {
     pub(super) list: List,
     pub(super) judgement: Option<&'j Judgement>,
     pub(super) textures: u16,
-    pub(super) turns: bool,
 }
 
 impl<'j> Entries<'j> {
@@ -62,8 +59,7 @@ impl<'j> Entries<'j> {
     /// all other textures.
     pub(super) fn count(self) -> u16 {
         match self.list {
-            List::Menu if self.turns => 5,
-            List::Menu => 4,
+            List::Menu => 3,
             List::Reference => self.textures.saturating_add(1),
             List::Name => self.textures.saturating_add(3),
         }
@@ -78,8 +74,6 @@ impl<'j> Entries<'j> {
         match (self.list, at) {
             (List::Menu, 0) => return Entry::Compare,
             (List::Menu, 1) => return Entry::About,
-            (List::Menu, 2) => return Entry::SetForce,
-            (List::Menu, 3) if self.turns => return Entry::TurnOver,
             (List::Reference, at) if at < self.textures => return Entry::Known(at),
             (List::Menu | List::Reference, _) => return Entry::Nothing,
             (List::Name, _) => {}
@@ -115,8 +109,6 @@ impl<'j> Entries<'j> {
                 screen::Entry::Text(match self.entry(at) {
                     Entry::Compare => "is it the same as ..?",
                     Entry::About => "about this probe",
-                    Entry::SetForce => "set the force",
-                    Entry::TurnOver => "turn it over",
                     Entry::Known(texture) => table.and_then(|t| t.name(texture)).unwrap_or("?"),
                     Entry::Numbered => {
                         return screen::Entry::Numbered(table.map_or(Name::new(), free_name));

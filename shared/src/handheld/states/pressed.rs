@@ -85,14 +85,6 @@ impl Handheld<'_> {
         match self.entries(list).entry(at) {
             Entry::Compare => self.show(Page::Choose(List::Reference, 0)),
             Entry::About => self.show(Page::About),
-            Entry::SetForce => {
-                self.job = Some(Job::Calibrate);
-                self.show(Page::Air);
-            }
-            Entry::TurnOver => {
-                self.job = Some(Job::TurnOver);
-                self.show(Page::Turn(false));
-            }
             Entry::Known(texture) if list == List::Reference => self.compare(texture),
             Entry::Known(texture) => self.teach(Choice::Known(texture)),
             Entry::Numbered => self.teach(Choice::Numbered),

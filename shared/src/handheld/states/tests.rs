@@ -114,11 +114,6 @@ impl<'p> Bench<'p> {
                 }
                 Err(why) => self.probe.judged(Err(why)),
             },
-            Some(Job::Calibrate) => self.probe.calibrated(Ok(ForceScale {
-                mn_per_count: 11.0,
-                off_mn: 5.0,
-            })),
-            Some(Job::TurnOver) => self.probe.turned(Err(Some("no g"))),
             Some(Job::Teach(choice)) => {
                 let slides = self.episode.take().unwrap().observed[0].1;
                 self.learned.push((choice, slides));
@@ -519,8 +514,6 @@ proptest! {
                     judged = false;
                 }
                 Some(Job::Teach(_)) => prop_assert!(judged, "learned from what nobody judged"),
-                Some(Job::Calibrate) => probe.calibrated(Err(Some("no line"))),
-                Some(Job::TurnOver) => probe.turned(Err(Some("no g"))),
                 None => {}
             }
             let screen = probe.screen(Some(&table), &About::default());

@@ -10,7 +10,6 @@ use tactus_lab::data::properties::PropertyTable;
 use tactus_lab::eval::evaluate::Method;
 use tactus_lab::eval::experiment::{Experiment, Protocol};
 use tactus_lab::eval::learn::Expected;
-use tactus_study::fabricslide::FabricSet;
 
 use crate::cmd::args::{Expecting, Features, Only, Recordings, Stop};
 use crate::cmd::output::Format;
@@ -33,9 +32,6 @@ known ones and slides are drawn with replacement, as in the paper.
 With --properties FILE, slides are rows of texture,movement,trial,set,traction,roughness,fineness, where set is
 train or validate, and an action is any (movement, property) pair.
 
-With --fabrics DIR, the folder is one of FabricSlide: fabrics at many movements, learned from one repetition and
-tested on the other.
-
 leave-one-session-out and leave-one-run-out test one session, or run of the machine, after the other, and learn from
 the others: the figure for another day. Textures with too few slides are left out and named; where these are half or
 more of them, all are learned from fewer slides.
@@ -53,23 +49,15 @@ Examples:
   tactus evaluate --recordings DIR --method paper
   tactus evaluate --recordings DIR --novelty leave-one-out
   tactus evaluate --recordings DIR --plot pictures
-  tactus evaluate --fabrics DIR
   tactus evaluate --recordings DIR --verify --protocol blocked")]
 pub(crate) struct Args {
     #[command(flatten)]
     pub(crate) from: Recordings,
     /// CSV file of properties in place of recordings
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "fabrics"])]
+    #[arg(long, value_name = "FILE", conflicts_with = "recordings")]
     pub(crate) properties: Option<PathBuf>,
-    /// Folder of FabricSlide in place of recordings
-    #[arg(long, value_name = "DIR", conflicts_with = "recordings")]
-    pub(crate) fabrics: Option<PathBuf>,
-    /// The repetition of the fabrics to learn from, 1 or 2; the other one is tested
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "fabrics",
-        value_parser = clap::value_parser!(u8).range(1..=2))]
-    pub(crate) repetition: u8,
     /// Folder to take the test slides from; training slides still come from --recordings
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["properties", "fabrics"])]
+    #[arg(long, value_name = "DIR", conflicts_with = "properties")]
     pub(crate) test: Option<PathBuf>,
     /// How to decide and to choose the next movement
     #[arg(long, value_enum, default_value_t = Method::Fused)]
@@ -158,11 +146,7 @@ impl<'n, T> Figures<'n, T> {
 }
 
 pub(crate) fn open(args: &Args) -> anyhow::Result<(Experiment, &'static str)> {
-    let (experiment, name) = if let Some(folder) = &args.fabrics {
-        let set = FabricSet::open(folder)?;
-        let experiment = set.experiment(args.repetition - 1, args.seed)?;
-        (experiment, "fabrics")
-    } else if let Some(file) = &args.properties {
+    let (experiment, name) = if let Some(file) = &args.properties {
         let set = PropertyTable::read(file)?;
         let experiment = Experiment::given(&set, args.train_slides, args.seed)
             .with_context(|| file.display().to_string())?;

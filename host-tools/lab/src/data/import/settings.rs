@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use regex::Regex;
 use serde::{Deserialize, Serialize};
 
 use tactus_core::sensor::FingerCode;
@@ -139,22 +140,10 @@ impl Settings {
                 .unwrap_or_default();
             RecordingError::at(&path, format!("{place}{}", why.message()))
         })?;
-        Ok(Self {
-            rate: self.rate.or(file.rate),
-            time: self.time.or(file.time),
-            channel: self.channel.or(file.channel),
-            unit: self.unit.or(file.unit),
-            gain: self.gain.or(file.gain),
-            pressure: self.pressure.or(file.pressure),
-            shear: self.shear.or(file.shear),
-            texture: self.texture.or(file.texture),
-            session: self.session.or(file.session),
-            finger: self.finger.or(file.finger),
-            force: self.force.or(file.force),
-            speed: self.speed.or(file.speed),
-            window: self.window.or(file.window),
-            length: self.length.or(file.length),
-        })
+        let mut all = toml::Table::try_from(file).unwrap_or_default();
+        all.extend(toml::Table::try_from(self).unwrap_or_default());
+        all.try_into()
+            .map_err(|why: toml::de::Error| RecordingError::at(&path, why))
     }
 
     /// These, and what the first file says by its kind: MCAP of ours has its columns.
@@ -258,12 +247,12 @@ fn is_number(field: &str) -> bool {
 
 impl Named {
     /// Takes the value of a field.
-    fn take(&mut self, field: &str, value: String) -> Option<()> {
+    fn take(&mut self, field: &str, value: &str) -> Option<()> {
         let number = || value.parse::<f32>().ok();
         match field {
-            "texture" => self.texture = value,
-            "session" => self.session = value,
-            "run" => self.run = value,
+            "texture" => self.texture = value.to_owned(),
+            "session" => self.session = value.to_owned(),
+            "run" => self.run = value.to_owned(),
             "speed" => self.speed = Some(number()?),
             "force" => self.force = Some(number()?),
             _ => self.force = Some(number()? / 1e3),
@@ -290,106 +279,51 @@ fn check_pattern(pattern: &str) -> std::result::Result<(), String> {
 /// Longest pattern of paths, bytes.
 pub(super) const MAX_PATTERN: usize = 256;
 
-/// A part of a pattern.
-#[derive(Clone, Copy)]
-enum Part<'p> {
-    Letter(char),
-    /// The first letter of a field of this name.
-    Field(&'p str),
-    /// Letters up to what comes next, or none; of a number its digits.
-    Rest {
-        digits: bool,
-    },
+/// A pattern of paths such as `{session}/{texture}_*.wav`, of at most [`MAX_PATTERN`] bytes. A star is anything but a
+/// slash; fields and stars are as short as can be.
+pub(super) struct Pattern {
+    like: Regex,
+    /// Names of the fields, in their order.
+    fields: Vec<String>,
 }
 
-/// A pattern beside a path.
-struct Match<'p> {
-    parts: Vec<Part<'p>>,
-    path: Vec<char>,
-    /// Where in the path each part begins.
-    begins: Vec<usize>,
-    /// By part and place: from there on it does not fit. Without it, stars would take a time that has no end.
-    failed: Vec<bool>,
-}
-
-impl Match<'_> {
-    /// True if the parts from this one on are the path from this place on; fields and stars are as short as can be.
-    fn fits(&mut self, part: usize, at: usize) -> bool {
-        let Some(kind) = self.parts.get(part).copied() else {
-            return at == self.path.len();
-        };
-        let state = part * (self.path.len() + 1) + at;
-        if self.failed[state] {
-            return false;
-        }
-        let next = self.path.get(at).copied();
-        let is_name = |digits: bool| {
-            next.is_some_and(|c| match digits {
-                true => c.is_ascii_digit() || c == '.',
-                false => c != '/',
-            })
-        };
-        self.begins[part] = at;
-        let fits = match kind {
-            Part::Letter(letter) => next == Some(letter) && self.fits(part + 1, at + 1),
-            Part::Field(name) => is_name(is_number(name)) && self.fits(part + 1, at + 1),
-            Part::Rest { .. } if self.fits(part + 1, at) => true,
-            Part::Rest { digits } => {
-                let fits = is_name(digits) && self.fits(part, at + 1);
-                // where it goes on is not where it begins
-                self.begins[part] = at;
-                fits
+impl Pattern {
+    pub(super) fn new(pattern: &str) -> Option<Self> {
+        let (mut like, mut fields, mut rest) = (String::from(r"\A"), Vec::new(), pattern);
+        while let Some(letter) = rest.chars().next() {
+            let after = &rest[letter.len_utf8()..];
+            let field = if letter == '{' {
+                after.split_once('}')
+            } else {
+                None
+            };
+            rest = field.map_or(after, |(_, after)| after);
+            match field {
+                Some((name, _)) if !name.is_empty() => {
+                    like += if is_number(name) {
+                        "([0-9.]+?)"
+                    } else {
+                        "([^/]+?)"
+                    };
+                    fields.push(name.to_owned());
+                }
+                None if letter != '*' => like += &regex::escape(letter.encode_utf8(&mut [0; 4])),
+                _ => like += "[^/]*?",
             }
-        };
-        self.failed[state] = !fits;
-        fits
+        }
+        let like = Regex::new(&(like + r"\z")).ok()?;
+        Some(Self { like, fields })
     }
-}
 
-/// The parts of a path by a pattern such as `{session}/{texture}_*.wav`, of at most [`MAX_PATTERN`] bytes. A star is
-/// anything but a slash.
-pub(super) fn matched(pattern: &str, path: &str) -> Option<Named> {
-    let mut parts = Vec::new();
-    let anything = Part::Rest { digits: false };
-    let mut rest = pattern;
-    while let Some(letter) = rest.chars().next() {
-        let after = &rest[letter.len_utf8()..];
-        let field = if letter == '{' {
-            after.split_once('}')
-        } else {
-            None
-        };
-        rest = field.map_or(after, |(_, after)| after);
-        match field {
-            Some(("", _)) => parts.push(anything),
-            Some((name, _)) => parts.extend([
-                Part::Field(name),
-                Part::Rest {
-                    digits: is_number(name),
-                },
-            ]),
-            None if letter == '*' => parts.push(anything),
-            None => parts.push(Part::Letter(letter)),
+    /// The parts of a path; nothing if it is not like this.
+    pub(super) fn named(&self, path: &str) -> Option<Named> {
+        let found = self.like.captures(path)?;
+        let mut named = Named::default();
+        for (field, value) in self.fields.iter().zip(found.iter().skip(1)) {
+            named.take(field, value?.as_str())?;
         }
+        Some(named).filter(|named| !named.texture.is_empty())
     }
-    let path: Vec<char> = path.chars().collect();
-    let mut found = Match {
-        begins: vec![path.len(); parts.len() + 1],
-        failed: vec![false; parts.len() * (path.len() + 1)],
-        parts,
-        path,
-    };
-    if !found.fits(0, 0) {
-        return None;
-    }
-    let mut named = Named::default();
-    for (at, part) in found.parts.iter().enumerate() {
-        if let Part::Field(field) = part {
-            let value = &found.path[found.begins[at]..found.begins[at + 2]];
-            named.take(field, value.iter().collect())?;
-        }
-    }
-    Some(named).filter(|named| !named.texture.is_empty())
 }
 
 /// What a path says without a pattern: the folder is the texture, and one of a session above or below it; without
@@ -426,6 +360,10 @@ pub(super) fn guessed(path: &str) -> Named {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn matched(pattern: &str, path: &str) -> Option<Named> {
+        Pattern::new(pattern).unwrap().named(path)
+    }
 
     #[test]
     fn paths_say_texture_and_session() {

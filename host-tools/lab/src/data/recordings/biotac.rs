@@ -66,12 +66,6 @@ struct Json {
     files: Vec<Entry>,
 }
 
-/// The part of a foreign manifest that tells what it is.
-#[derive(Deserialize)]
-struct Title {
-    title: String,
-}
-
 #[derive(Deserialize, Debug)]
 struct Field {
     name: String,
@@ -106,13 +100,6 @@ impl Manifest {
         let bytes = read_bounded(path, MAX_MANIFEST)?;
         let json: Json = serde_json::from_slice(&bytes).map_err(|e| {
             let place = format!("line {}, column {}", e.line(), e.column());
-            // the other recordings that this program knows have a manifest of the same name
-            let of = serde_json::from_slice::<Title>(&bytes);
-            if of.is_ok_and(|of| of.title.starts_with("FabricSlide")) {
-                let why = "this is FabricSlide, slides of another finger without P_AC: `tactus evaluate --fabrics \
-                 DIR` plays it";
-                return fault("title", why.to_owned());
-            }
             fault(&place, format!("{e}; the layout is that of data/biotac"))
         })?;
         let movement =

@@ -9,7 +9,6 @@ use tactus_core::features::Observation;
 use tactus_core::table::{OpenSet, Table};
 
 use super::{Experiment, Pool};
-use crate::eval::evaluate::EvaluateError;
 use crate::eval::learn::{TableError, learn_for};
 use crate::eval::open_set::{all_learned, figures, noted};
 
@@ -63,7 +62,7 @@ impl<'e> Run<'e> {
         &self,
         method: Method,
         done: impl Fn() + Sync,
-    ) -> Result<Option<OpenSet>, EvaluateError> {
+    ) -> Result<Option<OpenSet>, TableError> {
         let (bytes, taught) = (self.learn(method)?, all_learned(&self.training()));
         let expected = &self.experiment.expected;
         figures(Table::read(&bytes)?, expected, &taught, done)

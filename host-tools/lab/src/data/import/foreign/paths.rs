@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::columns::{no_channel, time};
 use crate::data::import::on_line;
-use crate::data::import::settings::{Named, Settings, guessed, matched};
+use crate::data::import::settings::{Named, Pattern, Settings, guessed};
 use crate::data::import::signals::{Signals, not_read};
 use crate::data::recordings::files::{OWN_MANIFEST, confined, open};
 use crate::data::recordings::{RecordingError, Result};
@@ -56,13 +56,13 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<(Paths, Vec<Stri
     }
     paths.sort_by_cached_key(|path| natural(path));
     let pattern = settings.pattern();
+    let like = pattern.and_then(Pattern::new);
+    // without a folder it is one of names
+    let of_names = pattern.is_some_and(|pattern| !pattern.contains('/'));
     let named = paths.into_iter().filter_map(|path| {
-        let named = match pattern {
-            // without a folder it is one of names
-            Some(pattern) if !pattern.contains('/') => {
-                matched(pattern, path.rsplit('/').next().unwrap_or(&path))?
-            }
-            Some(pattern) => matched(pattern, &path)?,
+        let name = path.rsplit('/').next().filter(|_| of_names);
+        let named = match &like {
+            Some(like) => like.named(name.unwrap_or(&path))?,
             None => guessed(&path),
         };
         Some((path, named))

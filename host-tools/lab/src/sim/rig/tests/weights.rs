@@ -3,7 +3,6 @@
 
 use embassy_futures::block_on;
 use rayon::prelude::*;
-use tactus_core::handheld::weights::WEIGHTS_MN;
 use tactus_core::probe::RigState;
 use tactus_core::probe::seams::RigHandle as _;
 use tactus_core::probe::servo_rig::{LOOK_MS, RigCommand, Samples, Servo, ServoRig};
@@ -18,6 +17,9 @@ use tactus_world::faults::Fault as WorldFault;
 use tactus_world::noise::Noise;
 use tactus_world::parts::PartFault;
 use tactus_world::person::{Hand, Manner};
+
+/// Weights as a kitchen scale shows them, 30, 60, 90, 120 and 150 g, as forces in mN.
+const WEIGHTS_MN: [u16; 5] = [294, 588, 883, 1177, 1471];
 use tactus_world::slot::Reader;
 use tactus_world::world::Setup;
 
