@@ -49,6 +49,7 @@ pub(crate) struct Bus {
     _spi: Peri<'static, peripherals::SPI1>,
     _pins: [ManuallyDrop<Flex<'static>>; 3],
     selects: [Select; SELECTS],
+    /// With the mode of the transaction under way, or of the last one.
     control: Cr1,
     clock: Clock,
     interrupts: bool,
@@ -105,7 +106,7 @@ impl Bus {
         self.control
             .set_dff(if plan.wide { Dff::BITS16 } else { Dff::BITS8 });
         let [(_, [step, ..]), ..] = &plan.slots;
-        self.control.0 |= u32::from(step.mode);
+        self.control.0 = self.control.0 & !MODE | u32::from(step.mode);
         self.set_clock(plan.clock);
     }
 
@@ -121,17 +122,28 @@ impl Bus {
     }
 
     #[inline(always)]
+    fn mode(&self) -> u8 {
+        (self.control.0 & MODE) as u8
+    }
+
+    #[inline(always)]
     fn select(&mut self, port: u8, low: bool) {
         if let Some(select) = self.selects.get(usize::from(port)) {
             select.set(low);
         }
     }
 
-    /// Sets the bus to a mode, by its number; no select is low, and no frame under way (RM0090 28.5.1).
+    /// Sets the bus to a mode, by its number; no select is low, and no frame under way. It is off meanwhile (RM0090
+    /// 28.3.1).
     #[inline(always)]
     fn set_mode(&mut self, mode: u8) {
-        SPI1.cr1()
-            .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
+        let next = Cr1(self.control.0 & !MODE | u32::from(mode));
+        for (control, on) in [(self.control, false), (next, false), (next, true)] {
+            let mut control = control;
+            control.set_spe(on);
+            SPI1.cr1().write_value(control);
+        }
+        self.control = next;
     }
 
     /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes
@@ -352,7 +364,7 @@ impl Slots {
         let [step, left @ ..] = self.left else {
             return;
         };
-        if self.plan.modes {
+        if self.plan.modes && self.bus.mode() != step.mode {
             self.bus.set_mode(step.mode);
         }
         self.bus.select(step.port, true);
