@@ -10,6 +10,7 @@ mod common;
 mod current;
 mod cuts;
 mod damaged_store;
+mod encoder;
 mod explore;
 mod faults;
 mod fingers;
