@@ -16,7 +16,7 @@ use embassy_stm32::pac::{SPI1, TIM2};
 use embassy_stm32::{Peri, peripherals, rcc};
 use heapless::spsc::Producer;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
-use tactus_core::sensor::slot::{Answer, Port, Transaction};
+use tactus_core::sensor::slot::{self, Answer, Port, Transaction};
 use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerParts, GRAVITY_PARTS};
 
 use crate::board::{self, held};
@@ -55,6 +55,8 @@ pub(crate) struct Bus {
     interrupts: bool,
 }
 
+/// Cycles for a us of a gap: twice as many, since the emulated core makes a loop of so many in fewer instructions.
+const GAP_CYCLES: u32 = 2 * 168;
 /// Looks at a frame in its time.
 const LOOKS: u32 = 32;
 
@@ -108,6 +110,14 @@ impl Bus {
         let [(_, [step, ..]), ..] = &plan.slots;
         self.control.0 = self.control.0 & !MODE | u32::from(step.mode);
         self.set_clock(plan.clock);
+    }
+
+    /// Frames are bytes again, and nobody is interrupted by them.
+    fn end_slots(&mut self) {
+        if core::mem::take(&mut self.interrupts) {
+            self.control.set_dff(Dff::BITS8);
+            self.restart();
+        }
     }
 
     /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no
@@ -275,6 +285,25 @@ pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, 
     // nobody who listens runs before this does
     SET_UP.store(true, Relaxed);
     pause(false);
+}
+
+/// P_DC, read without interrupts, which are off for good: for when nothing else works any more. `None`: no finger
+/// answers.
+pub(crate) fn pdc_by_hand() -> Option<u16> {
+    /// A slot of P_DC, of each finger.
+    const PDC: u32 = 1;
+    // SAFETY: nothing else runs any more.
+    let slots = unsafe { &mut *SHARED.0.get() }.as_mut()?;
+    slots.bus.end_slots();
+    let parts = finger::parts();
+    let answer = slot::perform(parts.slot(PDC), |transaction, bytes| {
+        let port = parts.ports.get(usize::from(transaction.port));
+        let done = slots.bus.transact(port, transaction, bytes);
+        chip::wait_cycles(GAP_CYCLES * transaction.gap_us);
+        done
+    });
+    let pressure = slots.finger.decode(PDC, &answer.ok()?).ok()?;
+    Some(pressure.counts.get())
 }
 
 #[interrupt]

@@ -22,6 +22,7 @@ mod motion;
 mod person;
 mod power_cut;
 mod referee;
+mod rescue;
 mod scenario;
 mod serve;
 mod settings;
