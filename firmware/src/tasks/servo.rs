@@ -22,7 +22,7 @@ use crate::board;
 use crate::chip::current::{self, Current};
 use crate::chip::lever::Lever;
 use crate::chip::slots::Word;
-use crate::chip::{finger, rescue, watchdog};
+use crate::chip::{debugger, finger, rescue, watchdog};
 
 /// Without a conversion of the motor's current for so many ms the motor is not driven on.
 const NO_CURRENT_MS: u32 = 10;
@@ -42,6 +42,7 @@ pub(crate) struct Pins {
     pub(crate) stage_left: Input<'static>,
     pub(crate) stage_right: Input<'static>,
     pub(crate) e_stop: Input<'static>,
+    debugged: bool,
 }
 
 impl Pins {
@@ -66,6 +67,7 @@ impl Pins {
             stage_left: switch(switches.stage_left.into()),
             stage_right: switch(switches.stage_right.into()),
             e_stop: switch(switches.e_stop.into()),
+            debugged: false,
         }
     }
 
@@ -90,7 +92,11 @@ impl Pins {
         inputs.encoder = self.count();
         inputs.lever_top = self.lever_top.is_high();
         inputs.stage_limits = (self.stage_left.is_high(), self.stage_right.is_high());
-        inputs.e_stop = self.e_stop.is_high();
+        self.debugged = debugger::is_there();
+        if !self.debugged {
+            debugger::keep_watchdog();
+        }
+        inputs.e_stop = self.e_stop.is_high() || self.debugged;
         if let Some(now_a) = self.current.amperes() {
             (self.current_a, self.no_current_ms) = (now_a, 0);
         } else {
@@ -106,7 +112,11 @@ impl Pins {
     fn write(&mut self, outputs: &Outputs) {
         self.lever
             .drive(outputs.lever_enabled, outputs.lever_steps_s);
-        self.drive_stage(outputs.stage_duty);
+        // also in the ms in which a stop is not believed yet
+        self.drive_stage(match self.debugged {
+            true => 0.0,
+            false => outputs.stage_duty,
+        });
         self.bridge.set_level(outputs.stage_enabled.into());
     }
 }
