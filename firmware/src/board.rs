@@ -15,6 +15,8 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
 
+use crate::chip::debugger;
+
 bind_interrupts!(pub(crate) struct Irqs {
     USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
     FLASH => flash::InterruptHandler;
@@ -148,8 +150,9 @@ pub(crate) const RESET_HZ: u32 = 16_000_000;
 #[inline(never)]
 pub(crate) fn start() -> AssignedResources {
     // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at
-    // either level.
+    // either level: at the high one the motor would get all of its supply.
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
+    debugger::keep_watchdog();
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
     start_caches();

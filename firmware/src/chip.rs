@@ -3,6 +3,7 @@
 mod bank2;
 mod critical_section;
 pub(crate) mod current;
+pub(crate) mod debugger;
 mod dsp_kernels;
 pub(crate) mod finger;
 pub(crate) mod flash;

@@ -12,7 +12,7 @@ use heapless::String;
 use tactus_core::rig::lever::MAX_STEPS;
 use tactus_core::wire::{Reset, Text};
 
-use super::{lever, watchdog};
+use super::{finger, lever, slots, watchdog};
 use crate::board::{self, Named, held};
 
 const MAGIC: u32 = 0x7ac7_1a57;
@@ -79,8 +79,8 @@ pub(crate) fn remember(text: &str) {
     });
 }
 
-/// Brakes the stage, lifts the finger up to the limit switch and starts the chip again. Whatever went wrong: nothing
-/// here needs an interrupt, memory or another task.
+/// Brakes the stage, lifts the finger up to the limit switch, unless that presses it, and starts the chip again.
+/// Whatever went wrong: nothing here needs an interrupt, memory or another task.
 pub(crate) fn give_up(why: &str) -> ! {
     cortex_m::interrupt::disable();
     remember(why);
@@ -98,14 +98,49 @@ pub(crate) fn give_up(why: &str) -> ! {
         pwm.set_as_output(Speed::Low);
         bridge.set_high();
         let mut closed = 0;
+        let mut force = Force::new();
         lever::lift_by_hand(|steps| {
             watchdog::pet();
             // pressed, or its wire is broken: three times, for it bounces
             closed = if top.is_high() { closed + 1 } else { 0 };
-            closed >= 3 || steps > MAX_STEPS as u32 * 5 / 4
+            closed >= 3
+                || steps > MAX_STEPS as u32 * 5 / 4
+                || steps % LOOK_STEPS == 0 && force.rises()
         });
     }
     SCB::sys_reset()
+}
+
+/// Steps from one look at P_DC to the next: 10 um.
+const LOOK_STEPS: u32 = 16;
+
+/// P_DC while the finger is lifted: it rises where the wire of DIR is broken, and the lever presses.
+struct Force {
+    least: Option<u16>,
+    /// The rise that says so, in three looks, counts: half a newton.
+    rise: u16,
+    looks: u8,
+}
+
+impl Force {
+    fn new() -> Self {
+        Self {
+            least: None,
+            rise: finger::parts().model.counts(500.0) as u16,
+            looks: 0,
+        }
+    }
+
+    fn rises(&mut self) -> bool {
+        let Some(now) = slots::pdc_by_hand() else {
+            return false;
+        };
+        let least = self.least.map_or(now, |least| least.min(now));
+        self.least = Some(least);
+        let rises = now.saturating_sub(least) > self.rise;
+        self.looks = if rises { self.looks + 1 } else { 0 };
+        self.looks >= 3
+    }
 }
 
 /// Stops a start that cannot be completed: no motor gets current, the red LED is on. To be called before a motor could

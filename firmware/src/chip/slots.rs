@@ -16,7 +16,7 @@ use embassy_stm32::pac::{SPI1, TIM2};
 use embassy_stm32::{Peri, peripherals, rcc};
 use heapless::spsc::Producer;
 use tactus_core::sensor::pressure::{Pressure, SLOTS_HZ};
-use tactus_core::sensor::slot::{Answer, Port, Transaction};
+use tactus_core::sensor::slot::{self, Answer, Port, Transaction};
 use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerParts, GRAVITY_PARTS};
 
 use crate::board::{self, held};
@@ -49,11 +49,14 @@ pub(crate) struct Bus {
     _spi: Peri<'static, peripherals::SPI1>,
     _pins: [ManuallyDrop<Flex<'static>>; 3],
     selects: [Select; SELECTS],
+    /// With the mode of the transaction under way, or of the last one.
     control: Cr1,
     clock: Clock,
     interrupts: bool,
 }
 
+/// Cycles for a us of a gap: twice as many, since the emulated core makes a loop of so many in fewer instructions.
+const GAP_CYCLES: u32 = 2 * 168;
 /// Looks at a frame in its time.
 const LOOKS: u32 = 32;
 
@@ -105,8 +108,16 @@ impl Bus {
         self.control
             .set_dff(if plan.wide { Dff::BITS16 } else { Dff::BITS8 });
         let [(_, [step, ..]), ..] = &plan.slots;
-        self.control.0 |= u32::from(step.mode);
+        self.control.0 = self.control.0 & !MODE | u32::from(step.mode);
         self.set_clock(plan.clock);
+    }
+
+    /// Frames are bytes again, and nobody is interrupted by them.
+    fn end_slots(&mut self) {
+        if core::mem::take(&mut self.interrupts) {
+            self.control.set_dff(Dff::BITS8);
+            self.restart();
+        }
     }
 
     /// Sets the bus up anew: a disturbance may have switched it off, and what is left in its buffers belongs to no
@@ -121,17 +132,28 @@ impl Bus {
     }
 
     #[inline(always)]
+    fn mode(&self) -> u8 {
+        (self.control.0 & MODE) as u8
+    }
+
+    #[inline(always)]
     fn select(&mut self, port: u8, low: bool) {
         if let Some(select) = self.selects.get(usize::from(port)) {
             select.set(low);
         }
     }
 
-    /// Sets the bus to a mode, by its number; no select is low, and no frame under way (RM0090 28.5.1).
+    /// Sets the bus to a mode, by its number; no select is low, and no frame under way. It is off meanwhile (RM0090
+    /// 28.3.1).
     #[inline(always)]
     fn set_mode(&mut self, mode: u8) {
-        SPI1.cr1()
-            .write_value(Cr1(self.control.0 & !MODE | u32::from(mode)));
+        let next = Cr1(self.control.0 & !MODE | u32::from(mode));
+        for (control, on) in [(self.control, false), (next, false), (next, true)] {
+            let mut control = control;
+            control.set_spe(on);
+            SPI1.cr1().write_value(control);
+        }
+        self.control = next;
     }
 
     /// Does a transaction and waits for it, before the slots begin: for who has nothing else to do. What comes in takes
@@ -265,6 +287,25 @@ pub(crate) fn begin(mut bus: Bus, timer: board::Slots, words: Producer<'static, 
     pause(false);
 }
 
+/// P_DC, read without interrupts, which are off for good: for when nothing else works any more. `None`: no finger
+/// answers.
+pub(crate) fn pdc_by_hand() -> Option<u16> {
+    /// A slot of P_DC, of each finger.
+    const PDC: u32 = 1;
+    // SAFETY: nothing else runs any more.
+    let slots = unsafe { &mut *SHARED.0.get() }.as_mut()?;
+    slots.bus.end_slots();
+    let parts = finger::parts();
+    let answer = slot::perform(parts.slot(PDC), |transaction, bytes| {
+        let port = parts.ports.get(usize::from(transaction.port));
+        let done = slots.bus.transact(port, transaction, bytes);
+        chip::wait_cycles(GAP_CYCLES * transaction.gap_us);
+        done
+    });
+    let pressure = slots.finger.decode(PDC, &answer.ok()?).ok()?;
+    Some(pressure.counts.get())
+}
+
 #[interrupt]
 fn TIM2() {
     let flags = TIM2.sr().read();
@@ -352,7 +393,7 @@ impl Slots {
         let [step, left @ ..] = self.left else {
             return;
         };
-        if self.plan.modes {
+        if self.plan.modes && self.bus.mode() != step.mode {
             self.bus.set_mode(step.mode);
         }
         self.bus.select(step.port, true);

@@ -1,4 +1,5 @@
 //! The handheld's display: an SSD1306 on I2C1, told of a whole picture at a time, by DMA while the core sleeps.
+use embassy_stm32::gpio::{Input, Level, OutputOpenDrain, Pull, Speed};
 use embassy_stm32::i2c::{self, I2c, Master};
 use embassy_stm32::mode::Async;
 use embassy_stm32::time::Hertz;
@@ -70,7 +71,36 @@ const AREA: [u8; 7] = [
     HEIGHT as u8 / 8 - 1,
 ];
 
-type Bus = I2c<'static, Async, Master>;
+type Bus<'p> = I2c<'p, Async, Master>;
+
+/// It does not answer, or the bus does not go on.
+struct Hangs;
+
+/// A picture takes 24 ms. A bus that is busy, or has lost its interrupt, would be waited for without end.
+const LONGEST: Duration = Duration::from_millis(100);
+
+async fn write(bus: &mut Bus<'_>, bytes: &[u8]) -> Result<(), Hangs> {
+    match with_timeout(LONGEST, bus.write(ADDRESS, bytes)).await {
+        Ok(Ok(())) => Ok(()),
+        _ => Err(Hangs),
+    }
+}
+
+/// Clocks a display that was interrupted in a byte and holds SDA down, until it lets go (UM10204, 3.1.16).
+async fn free(pins: &mut board::Display) {
+    let sda = Input::new(pins.sda.reborrow(), Pull::Up);
+    let (high, slow) = (Level::High, Speed::Low);
+    let mut scl = OutputOpenDrain::new_pull(pins.scl.reborrow(), high, slow, Pull::Up);
+    for _ in 0..9 {
+        Timer::after_micros(10).await;
+        if sda.is_high() {
+            break;
+        }
+        scl.set_low();
+        Timer::after_micros(10).await;
+        scl.set_high();
+    }
+}
 
 struct Sent {
     bytes: [u8; 1 + WIDTH * HEIGHT / 8],
@@ -88,11 +118,9 @@ impl Sent {
 }
 
 #[embassy_executor::task]
-pub(crate) async fn show(pins: board::Display) {
+pub(crate) async fn show(mut pins: board::Display) {
     let mut config = i2c::Config::default();
     config.frequency = Hertz(400_000);
-    config.timeout = Duration::from_millis(50);
-    let mut bus = I2c::new(pins.i2c, pins.scl, pins.sda, pins.tx, pins.rx, Irqs, config);
     let mut sent = Sent {
         bytes: [0; 1 + WIDTH * HEIGHT / 8],
         any: false,
@@ -101,38 +129,50 @@ pub(crate) async fn show(pins: board::Display) {
         *first = POINTS;
     }
     loop {
+        free(&mut pins).await;
+        // made anew: one that hangs does not go on by itself
+        let mut bus = I2c::new(
+            pins.i2c.reborrow(),
+            pins.scl.reborrow(),
+            pins.sda.reborrow(),
+            pins.tx.reborrow(),
+            pins.rx.reborrow(),
+            Irqs,
+            config,
+        );
         // its power may come late, or its plug be loose
         if run(&mut bus, &mut sent).await.is_err() {
             defmt::warn!("no display: it does not answer");
         }
+        drop(bus);
         Timer::after(AGAIN).await;
     }
 }
 
 /// Shows one picture after the other, beginning with the last one, until the display does not answer.
-async fn run(bus: &mut Bus, sent: &mut Sent) -> Result<(), i2c::Error> {
-    bus.write(ADDRESS, &INIT).await?;
-    bus.write(ADDRESS, &ON).await?;
+async fn run(bus: &mut Bus<'_>, sent: &mut Sent) -> Result<(), Hangs> {
+    write(bus, &INIT).await?;
+    write(bus, &ON).await?;
     let (mut lit, mut due) = (true, sent.any);
     let mut answered = Instant::now();
     loop {
         if due {
-            bus.write(ADDRESS, &AREA).await?;
-            bus.write(ADDRESS, &sent.bytes).await?;
+            write(bus, &AREA).await?;
+            write(bus, &sent.bytes).await?;
             answered = Instant::now();
         }
         due = false;
         if let Ok(next) = with_timeout(AGAIN, SHOW.wait()).await {
             if next != lit {
                 lit = next;
-                bus.write(ADDRESS, if lit { &ON } else { &OFF }).await?;
+                write(bus, if lit { &ON } else { &OFF }).await?;
             }
             let picture = NEXT.lock().await;
             due = lit && sent.take(&picture);
         }
         if !due && answered.elapsed() >= AGAIN {
             // nothing new: is it still there?
-            bus.write(ADDRESS, if lit { &ON } else { &OFF }).await?;
+            write(bus, if lit { &ON } else { &OFF }).await?;
             answered = Instant::now();
         }
     }

@@ -59,6 +59,8 @@ pub struct Flow {
     bank: u8,
     ground: Ground,
     unplugged: bool,
+    /// what is written does not read back
+    write_only: bool,
     /// ln of by how much the scale of this movement is off
     repeat: f64,
     /// counts that were not read, and the time and place up to which they are
@@ -103,6 +105,11 @@ impl Flow {
             self.restart();
         }
         self.unplugged = unplugged;
+    }
+
+    /// From now on what was written to it does not read back: no public driver shows that it does.
+    pub fn write_only(&mut self) {
+        self.write_only = true;
     }
 
     /// Accesses that broke its timing.
@@ -237,6 +244,7 @@ impl Flow {
         match (bank, register) {
             (0, 0x00) => 0x49,
             (0, 0x5F) => 0xB6,
+            _ if self.write_only => 0,
             _ => self.registers.get(&(bank, register)).copied().unwrap_or(0),
         }
     }

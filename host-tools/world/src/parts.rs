@@ -83,7 +83,10 @@ impl Peers {
                 parts.selected = Some(part == 0);
                 match part {
                     0 => parts.accelerometer.select(now_ns, mode),
-                    _ => parts.cell.select(now_ns, mode),
+                    _ => {
+                        parts.accelerometer.overhear(mode);
+                        parts.cell.select(now_ns, mode);
+                    }
                 }
             }
         }

@@ -44,9 +44,10 @@ const BLOCKS: u8 = 0x44;
 const ON: u8 = 0xA2;
 /// CTRL8_XL: that low-pass at a twentieth of the rate, 1333 Hz (REG: hpcf_xl = 2).
 const LOW_PASS: u8 = 0x40;
-/// CTRL6_C and CTRL4_C: Z alone, in all output registers (REG: xl_axis_sel = 3, _1ax_to_3regout).
+/// CTRL6_C and CTRL4_C: Z alone, in all output registers (REG: xl_axis_sel = 3, _1ax_to_3regout); and I2C off
+/// (REG: i2c_disable), for which it would take the ADS1220's transfers while it is not selected.
 const Z_ALONE: u8 = 0x03;
-const IN_ALL: u8 = 0x01;
+const IN_ALL: u8 = 0x05;
 
 /// The value of an LSB at +-2 g, g (REG: iis3dwb_from_fs2g_to_mg).
 pub(super) const G_PER_LSB: f32 = 0.061e-3;

@@ -27,7 +27,7 @@ const INVERSE_IDENTITY: u8 = 0x5F;
 const BANK: u8 = 0x7F;
 /// The identity, and its complement.
 const IS: [u8; 2] = [0x49, 0xB6];
-/// The register's value that turns the axes: reads back as written.
+/// The register's value that turns the axes. That it reads back is not known.
 const TURNED: u8 = 0xA0;
 
 /// From the address to the data of a read (tSRAD), ns.
@@ -150,6 +150,8 @@ pub struct Paa5100je<SPI> {
     moved_ms: u32,
     fault: Option<MotionFault>,
     found: bool,
+    /// [`ORIENTATION`] as it reads once the list is written: another value later says that the part lost its power.
+    orientation: u8,
 }
 
 impl<SPI: SpiDevice> Paa5100je<SPI> {
@@ -162,6 +164,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
             moved_ms: 0,
             fault: None,
             found: false,
+            orientation: 0,
         }
     }
 
@@ -232,7 +235,8 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
                     (State::Written(parts + 1), PAUSE_MS)
                 }
                 None => {
-                    self.check()?;
+                    self.identify()?;
+                    self.orientation = self.read(ORIENTATION)?;
                     // of the way since the reset nothing is known
                     self.read_motion()?;
                     self.moved_ms = now_ms;
@@ -263,7 +267,7 @@ impl<SPI: SpiDevice> Paa5100je<SPI> {
 
     fn check(&mut self) -> Result<(), MotionFault> {
         self.identify()?;
-        if self.read(ORIENTATION)? == TURNED {
+        if self.read(ORIENTATION)? == self.orientation {
             Ok(())
         } else {
             Err(MotionFault::Forgot)

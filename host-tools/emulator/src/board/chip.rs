@@ -86,10 +86,7 @@ impl Part {
             },
             encoder: Tapped {
                 model: narrow(),
-                tap: Encoder {
-                    rig: rig.clone(),
-                    lines: (false, false),
-                },
+                tap: Encoder::new(rig.clone(), RESET_HZ),
             },
             current: Tapped {
                 model: converter(),
@@ -119,9 +116,8 @@ impl Mcu for Part {
         self.pwm.model = narrow();
         self.pwm.tap.restart(RESET_HZ);
         self.encoder.model = narrow();
+        self.encoder.tap.restart(RESET_HZ);
         self.current.model = converter();
-        // the fresh timer believes both lines low, until the next read
-        self.encoder.tap.lines = (false, false);
     }
 
     /// Only USART3 has a peer outside. rigless' own poll asks all eight ports at every stop.

@@ -31,6 +31,8 @@ enum Next {
 pub struct Display {
     wired: bool,
     plugged: bool,
+    /// clocks that it wants until it lets go of the data line, which it holds down
+    holds: u32,
     next: Next,
     /// a command with its parameters so far
     command: Vec<u8>,
@@ -56,6 +58,7 @@ impl Default for Display {
         Self {
             wired: false,
             plugged: true,
+            holds: 0,
             next: Next::Control,
             command: Vec::new(),
             ram: [0; WIDTH * HEIGHT / 8],
@@ -128,6 +131,21 @@ impl Display {
     /// one.
     pub(crate) fn written_ns(&self) -> Option<u64> {
         self.whole_ns
+    }
+
+    /// It holds the data line down until it has got so many clocks, as in the middle of a byte.
+    pub(super) fn hold(&mut self, clocks: u32) {
+        self.holds = clocks;
+    }
+
+    /// Returns true while it holds the data line down: the bus is busy, and nothing begins on it.
+    pub(super) fn holds(&self) -> bool {
+        self.holds > 0
+    }
+
+    /// A clock by the port, which the bus has not got.
+    pub(super) fn clock(&mut self) {
+        self.holds = self.holds.saturating_sub(1);
     }
 
     /// Pulls its plug, or puts it in again: then it is as after its reset.

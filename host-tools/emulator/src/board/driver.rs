@@ -22,6 +22,7 @@ use super::upset::Switch;
 
 const SPI1_CR1: u64 = 0x4001_3000;
 const SPI4_CR1: u64 = 0x4001_3400;
+const I2C1_CR1: u64 = 0x4000_5400;
 const TIM5_SR: u64 = 0x4000_0C10;
 const TIM5_EGR: u64 = 0x4000_0C14;
 const RCC_CR: u64 = 0x4002_3800;
@@ -76,6 +77,8 @@ pub(crate) struct Driver {
     pub(crate) flash_slow: bool,
     /// a switch that cannot be turned on
     pub(crate) held_off: Option<Switch>,
+    /// level of the display's clock, by the port
+    pub(crate) scl: bool,
     /// judges what the firmware does to the chip, from the first instruction on
     pub(crate) referee: Option<Referee>,
     /// a debugger has halted the core
@@ -94,6 +97,17 @@ impl Driver {
     fn port(&mut self, board: &mut Board, now_ns: u64, port: usize) {
         let rig = self.rig.clone();
         let mut rig = lock(&rig);
+        let [scl, sda] = pins::DISPLAY_I2C;
+        if scl.port() == port && rig.display().holds() {
+            let high = by_port(board, scl, pins::I2C1_FUNCTION) == Some(true);
+            if high && !std::mem::replace(&mut self.scl, high) {
+                rig.display_mut().clock();
+            }
+            self.scl = high;
+            if !rig.display().holds() {
+                board.drive(VirtualNanos(now_ns), sda, None);
+            }
+        }
         let mut at = |pin: PinId| (pin.port() == port).then(|| board.level(pin));
         for (part, pin) in (0..).zip([pins::SENSOR_CS, pins::SENSOR_CS_2]) {
             if let Some(high) = at(pin) {
@@ -282,6 +296,9 @@ impl Driver {
                 if configures {
                     self.lines(board, now);
                 }
+            }
+            I2C1_CR1 if lock(&self.rig).display_mut().holds() => {
+                Switch::I2c1.off(&mut session.board_mut().part, now);
             }
             SPI1_CR1 => lock(&self.rig).spi_control(access.value),
             SPI4_CR1 => lock(&self.rig).motion().control(access.value),

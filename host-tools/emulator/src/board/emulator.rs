@@ -90,6 +90,7 @@ impl Emulator {
             flash_stuck: false,
             flash_slow: false,
             held_off: None,
+            scl: true,
             referee: None,
             halt: None,
         };
@@ -362,6 +363,18 @@ impl Emulator {
         self.with(move |standing| {
             switch.off(&mut standing.session.board_mut().part, at);
             standing.driver.held_off = lasting.then_some(switch);
+        })
+    }
+
+    /// The display holds its data line down until it has got so many clocks. The bus is busy meanwhile: its start is
+    /// never made (chosen: I2C1 is off, as rigless has no busy bus).
+    pub fn hold_display(&mut self, clocks: u32) -> Result<(), Error> {
+        let at = VirtualNanos(self.now_ns);
+        self.with(move |standing| {
+            lock(&standing.driver.rig).display_mut().hold(clocks);
+            let board = standing.session.board_mut();
+            board.drive(at, pins::DISPLAY_I2C[1], Some(false));
+            Switch::I2c1.off(&mut board.part, at);
         })
     }
 

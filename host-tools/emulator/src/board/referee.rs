@@ -4,6 +4,7 @@
 
 mod accelerator;
 mod converter;
+mod spi;
 mod vendor;
 mod violation;
 
@@ -308,7 +309,11 @@ impl Referee {
             }
             ("adc", "CR2") => self.conversion(now, of, before, after),
             ("timer", "CCER") => self.outputs(now, of, after & !before),
-            (_, "CR1") => self.start(now, of, kind, before, after),
+            ("rcc", _) if register.ends_with("RSTR") => self.resets(address, after & !before),
+            (_, "CR1") => {
+                self.start(now, of, kind, before, after);
+                self.spi_running(now, of, before, after);
+            }
             _ => {}
         }
     }

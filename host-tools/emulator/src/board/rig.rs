@@ -11,6 +11,7 @@ use super::display::Display;
 use super::motion::MotionPeer;
 use super::options::Options;
 use super::record::{Recorder, Slide, Touch};
+use super::taps::Coupled;
 use super::wave::Wave;
 
 /// Shortest byte of the fastest clock of a finger's parts, ns: 10 MHz of BioTac and IIS3DWB, 0.9 MHz of the MCP3202 at
@@ -82,6 +83,7 @@ pub struct Rig {
     spi_control: u64,
     motion: MotionPeer,
     encoder_lines: (bool, bool),
+    coupled_ns: Option<u64>,
     trace_ns: u64,
     trace: VecDeque<(u64, Output)>,
     recorder: Recorder,
@@ -133,6 +135,7 @@ impl Rig {
             spi_control: 0,
             motion: MotionPeer::new(setup.trial_seed, options.motion),
             encoder_lines: (false, false),
+            coupled_ns: None,
             trace_ns: options.trace_s * 1_000_000_000,
             trace: VecDeque::new(),
             recorder: Recorder::default(),
@@ -386,10 +389,19 @@ impl Rig {
     }
 
     /// The encoder's lines after its next edge up to the time reached.
-    pub(crate) fn next_encoder_lines(&mut self) -> Option<(bool, bool)> {
+    pub(crate) fn next_encoder_lines(&mut self) -> Option<(u64, (bool, bool))> {
         let edge = self.world.next_encoder_edge()?;
         self.encoder_lines = (edge.a, edge.b);
-        Some(self.encoder_lines())
+        Some((edge.at_ns, self.encoder_lines()))
+    }
+
+    /// From now on the stage's bridge couples spikes of so many ns into the encoder's lines.
+    pub fn couple_bridge(&mut self, ns: u64) {
+        self.coupled_ns = Some(ns);
+    }
+
+    pub(super) fn coupled(&self) -> Option<Coupled> {
+        self.coupled_ns.filter(|_| self.stage_enabled).map(Coupled)
     }
 
     /// The encoder's lines as the timer sees them.

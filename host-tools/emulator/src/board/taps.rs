@@ -235,45 +235,146 @@ impl Tap<Tim<General>> for Pwm {
     }
 }
 
-/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before every read.
+/// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before every read, each behind the
+/// filter of its input: the model's own filter would take edges that are shown late for spikes.
 #[derive(Debug)]
 pub(super) struct Encoder {
-    pub(super) rig: SharedRig,
-    pub(super) lines: (bool, bool),
+    rig: SharedRig,
+    /// Of the timer, Hz.
+    clock: u64,
+    /// The encoder's lines, the levels at the pins with the time since when, and those behind the filters.
+    lines: (bool, bool),
+    pins: [(bool, u64); 2],
+    shown: [bool; 2],
+    now_ns: u64,
 }
 
+/// Divider of the timer's clock and number of samples, by ICxF (RM0090 18.4.7).
+const FILTERS: [(u64, u64); 16] = [
+    (1, 0),
+    (1, 2),
+    (1, 4),
+    (1, 8),
+    (2, 6),
+    (2, 8),
+    (4, 6),
+    (4, 8),
+    (8, 6),
+    (8, 8),
+    (16, 5),
+    (16, 6),
+    (16, 8),
+    (32, 5),
+    (32, 6),
+    (32, 8),
+];
+/// IC1F and IC2F in CCMR1.
+const IC_FILTERS: u64 = 0xF0F0;
+
 impl Encoder {
-    fn show(
-        shown: &mut (bool, bool),
-        (a, b): (bool, bool),
-        tim: &mut Tim<General>,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        if a != shown.0 {
-            tim.drive_input(channel(1), a.into(), registers, context);
+    pub(super) fn new(rig: SharedRig, clock: u64) -> Self {
+        Self {
+            rig,
+            clock,
+            lines: (false, false),
+            pins: [(false, 0); 2],
+            shown: [false; 2],
+            now_ns: 0,
         }
-        if b != shown.1 {
-            tim.drive_input(channel(2), b.into(), registers, context);
+    }
+
+    /// The timer was reset: it believes both lines low, until the next read.
+    pub(super) fn restart(&mut self, clock: u64) {
+        let now_ns = self.now_ns;
+        *self = Self::new(self.rig.clone(), clock);
+        self.now_ns = now_ns;
+    }
+
+    /// What the pins come to up to now: times, and the encoder's lines where these change.
+    fn events(&mut self, now_ns: u64) -> (Vec<(u64, Option<(bool, bool)>)>, Option<Coupled>) {
+        let mut rig = lock(&self.rig);
+        rig.advance_to(now_ns);
+        let mut events: Vec<_> = std::iter::from_fn(|| rig.next_encoder_lines())
+            .map(|(at_ns, lines)| (at_ns.max(self.now_ns), Some(lines)))
+            .collect();
+        let coupled = rig.coupled();
+        if let Some(coupled) = coupled {
+            events.extend(
+                coupled
+                    .edges(self.now_ns, now_ns)
+                    .map(|at_ns| (at_ns, None)),
+            );
+            events.sort_by_key(|(at_ns, _)| *at_ns);
         }
-        *shown = (a, b);
+        events.push((now_ns, Some(rig.encoder_lines())));
+        (events, coupled)
     }
 }
 
 impl Tap<Tim<General>> for Encoder {
+    fn clocked(&mut self, hz: u64) {
+        self.clock = hz;
+    }
+
     fn before(
         &mut self,
         tim: &mut Tim<General>,
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
-        let mut rig = lock(&self.rig);
-        rig.advance_to(context.now().0);
-        while let Some(lines) = rig.next_encoder_lines() {
-            Self::show(&mut self.lines, lines, tim, registers, context);
+        let now_ns = context.now().0;
+        let (events, coupled) = self.events(now_ns);
+        let inputs = registers.get(TimRegister::Ccmr1Input);
+        let dts = registers.get(TimRegister::Cr1) >> 8 & 3;
+        let delays = [4, 12].map(|bit| {
+            let (divider, samples) = FILTERS[(inputs >> bit & 15) as usize];
+            ((samples * divider) << dts) * 1_000_000_000 / self.clock
+        });
+        registers.set(TimRegister::Ccmr1Input, inputs & !IC_FILTERS);
+        for (at_ns, lines) in events.into_iter().chain([(now_ns, None)]) {
+            let mut order = [0, 1];
+            order.sort_by_key(|line| self.pins[*line].1 + delays[*line]);
+            for line in order {
+                let (level, since_ns) = self.pins[line];
+                if level != self.shown[line] && since_ns + delays[line] <= at_ns {
+                    self.shown[line] = level;
+                    tim.drive_input(channel(line as u8 + 1), level.into(), registers, context);
+                }
+            }
+            self.lines = lines.unwrap_or(self.lines);
+            let turned = coupled.map_or((false, false), |coupled| coupled.at(at_ns));
+            let levels = [self.lines.0 ^ turned.0, self.lines.1 ^ turned.1];
+            for (pin, level) in self.pins.iter_mut().zip(levels) {
+                if pin.0 != level {
+                    *pin = (level, at_ns);
+                }
+            }
         }
-        let lines = rig.encoder_lines();
-        Self::show(&mut self.lines, lines, tim, registers, context);
+        registers.set(TimRegister::Ccmr1Input, inputs);
+        self.now_ns = now_ns;
+    }
+}
+
+/// Spikes of the stage's bridge on the encoder's lines: each edge of its PWM turns line A for so long, ns, and line B
+/// a third of that later, as their wires run side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Coupled(pub(super) u64);
+
+impl Coupled {
+    /// From one edge of the PWM to the next (chosen: half a period).
+    const EVERY_NS: u64 = 24_405;
+
+    fn edges(self, after_ns: u64, until_ns: u64) -> impl Iterator<Item = u64> {
+        let periods = after_ns / Self::EVERY_NS..=until_ns / Self::EVERY_NS;
+        let offsets = [0, self.0 / 3, self.0, self.0 + self.0 / 3];
+        let all = periods.flat_map(move |n| offsets.map(|offset| n * Self::EVERY_NS + offset));
+        all.filter(move |at_ns| (after_ns + 1..=until_ns).contains(at_ns))
+    }
+
+    /// The lines that are turned.
+    fn at(self, ns: u64) -> (bool, bool) {
+        let (since, third) = (ns % Self::EVERY_NS, self.0 / 3);
+        (since < self.0, (third..third + self.0).contains(&since))
     }
 }
 

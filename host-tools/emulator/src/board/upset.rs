@@ -13,6 +13,8 @@ pub enum Switch {
     Spi1,
     /// ADC1's: without it no conversion is ever over.
     Adc1,
+    /// I2C1's: without it no start is ever made.
+    I2c1,
     /// Of the stream of DMA2 that carries ADC1: without it no conversion arrives, and the converter stops.
     Dma2,
 }
@@ -20,9 +22,10 @@ pub enum Switch {
 impl Switch {
     fn place(self) -> (u64, u64) {
         match self {
-            // SPE of CR1, ADON of CR2, EN of S0CR
+            // SPE of CR1, ADON of CR2, PE of CR1, EN of S0CR
             Self::Spi1 => (0x4001_3000, 1 << 6),
             Self::Adc1 => (0x4001_2008, 1),
+            Self::I2c1 => (0x4000_5400, 1),
             Self::Dma2 => (0x4002_6410, 1),
         }
     }

@@ -2,6 +2,7 @@
 
 use tactus_core::wire::Command;
 use tactus_emulator::board::{Emulator, Output};
+use tactus_emulator::host::talk::TalkError;
 
 use crate::common::elf;
 use crate::faults::{When, board, identify, is_time};
@@ -103,4 +104,62 @@ fn a_halt_that_the_watchdog_ends_presses_no_further() {
     if let Some((_, force_max_n)) = steps_in_halts(When::Sliding, false, 2) {
         assert!(force_max_n < 2.2, "{force_max_n} N");
     }
+}
+
+/// A tool that is gone has left DBGMCU so that the watchdog stands in a halt.
+#[test]
+fn the_watchdog_goes_on_in_a_halt_after_a_tool_stopped_it() {
+    let Some(elf) = elf() else { return };
+    let mut talk = board(&elf, 62, 30);
+    let halts = [(true, 10), (false, HALTED_MS)];
+    for (watchdog_stands, ms) in halts {
+        talk.board().halt(watchdog_stands).unwrap();
+        talk.board().run_ms(ms).unwrap();
+        talk.board().go_on().unwrap();
+        talk.board().run_ms(10).unwrap();
+    }
+    assert_eq!(talk.board().resets().unwrap().len(), 1);
+}
+
+/// A debugger comes while the finger slides, and halts nothing yet.
+#[test]
+fn with_a_debugger_no_motor_moves() {
+    let Some(elf) = elf() else { return };
+    let mut talk = board(&elf, 63, 30);
+    let mut came_ns = None;
+    let ended = talk.send(identify(1), 120.0, |board, report| {
+        if report.is_none() && came_ns.is_none() && is_time(When::Sliding, board) {
+            let (address, _) = board.symbol("tactus_is_debugged").unwrap();
+            // movs r0, #1; bx lr
+            board
+                .write(address & !1, &[0x01, 0x20, 0x70, 0x47])
+                .unwrap();
+            came_ns = Some(board.now_ns());
+        }
+    });
+    assert!(matches!(ended, Err(TalkError::Refused(_))), "{ended:?}");
+    let refused = talk.send(Command::Home, 40.0, |_, _| ());
+    assert!(refused.is_err(), "homed under a debugger");
+    talk.board().run_ms(1000).unwrap();
+    let braked_ns = {
+        let rig = talk.board().rig();
+        let duties = rig.trace().filter_map(|(at_ns, output)| match output {
+            Output::StageDuty(duty) => Some((*at_ns, *duty)),
+            _ => None,
+        });
+        let last = duties.last();
+        assert!(last.is_none_or(|(_, duty)| duty == 0.0), "{last:?}");
+        last.map(|(at_ns, _)| at_ns)
+    };
+    let late_ms = braked_ns.map(|at_ns| at_ns.saturating_sub(came_ns.unwrap()) / 1_000_000);
+    assert!(
+        late_ms.is_none_or(|ms| ms < 9),
+        "braked after {late_ms:?} ms"
+    );
+    assert!(
+        steps(talk.board())
+            .iter()
+            .all(|at_ns| at_ns + 500_000_000 < talk.board().now_ns())
+    );
+    assert_eq!(talk.board().rig().world().truth().force_n, 0.0);
 }

@@ -325,3 +325,31 @@ fn a_damaged_table_is_told_on_the_display() {
     assert!(held.status().factory);
     held.end();
 }
+
+/// A display that holds its bus down: the probe identifies without one, and shows again once it has let go.
+#[test]
+fn a_display_that_hangs_costs_no_identification() {
+    let Some(mut held) = Held::new("burlap", Manner::default()) else {
+        return;
+    };
+    held.talk.board().hold_display(u32::MAX).unwrap();
+    let identify = Request::identify(Identify::default());
+    let found = held.talk.run(identify, LONG_S, |board, report| {
+        let Some(Event::Prompt(prompt)) = report.map(|report| &report.event) else {
+            return;
+        };
+        let (force_n, mm_s) = match prompt {
+            Prompt::Press => (0.5, 0.0),
+            Prompt::Slide => (0.5, 25.0),
+            _ => (0.0, 0.0),
+        };
+        board.rig().world().hand().unwrap().intend(force_n, mm_s);
+    });
+    assert_eq!(found.unwrap().verdict.name.as_str(), "Burlap");
+    let seen = held.talk.board().rig().display().bytes();
+    held.talk.board().hold_display(5).unwrap();
+    held.until("a picture", 3.0, |board| {
+        board.rig().display().bytes() > seen + 1024
+    });
+    held.end();
+}

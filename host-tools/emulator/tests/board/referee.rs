@@ -276,6 +276,21 @@ fn cases() -> Vec<(Rule, Vec<Do>, Vec<Do>)> {
             ]),
         ),
         (
+            Rule::SpiRunning,
+            // off, another mode, on; and another speed after a reset
+            all(&[
+                &SPI_PINS,
+                &[
+                    W(SPI1, 0x344),
+                    W(SPI1, 0x304),
+                    W(SPI1, 0x305),
+                    W(SPI1, 0x345),
+                ],
+                &[W(APB2RSTR, 1 << 12), W(APB2RSTR, 0), W(SPI1, 0x374)],
+            ]),
+            all(&[&SPI_PINS, &[W(SPI1, 0x344), W(SPI1, 0x345)]]),
+        ),
+        (
             Rule::NotAnalog,
             all(&[&adc, &[W(GPIOA, 0xA800_00C0)], &convert]),
             all(&[&adc, &convert]),

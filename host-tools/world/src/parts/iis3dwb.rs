@@ -67,7 +67,7 @@ pub(crate) struct Iis3dwb {
     /// Of this select: bits come late, the address once it is known, and whether it is written.
     heard: bool,
     address: Option<(u8, bool)>,
-    /// Writes to bits that must not change.
+    /// Writes to bits that must not change, and transfers of others that it takes for its own.
     pub(super) complaints: u64,
 }
 
@@ -199,6 +199,13 @@ impl Iis3dwb {
     /// Chip select rises.
     pub(super) fn deselect(&mut self) {
         self.heard = false;
+    }
+
+    /// The bus begins a transfer with another part. Without a select of its own the part takes the lines for I2C
+    /// (header: i2c_disable), where data that change as the clock rises are a START; complained of while it measures.
+    pub(super) fn overhear(&mut self, mode: ClockMode) {
+        let listens = self.registers[0x13] & 4 == 0 && self.on_since_ns.is_some();
+        self.complaints += u64::from(listens && !mode.on_rising());
     }
 
     /// A byte: the address, or data.

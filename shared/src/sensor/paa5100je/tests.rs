@@ -50,6 +50,7 @@ fn another_part_and_no_part_are_told_and_asked_again() {
 fn ready(bus: Vec<Vec<Spi<u8>>>) -> Paa5100je<Mock<u8>> {
     Paa5100je {
         state: State::Ready,
+        orientation: 0xA0,
         ..Paa5100je::new(Mock::new(&bus.concat()))
     }
 }

@@ -25,6 +25,8 @@ pub enum Rule {
     NoPin,
     /// Lead two pins to one input of a peripheral.
     TwoPins,
+    /// Change an SPI's clock, frame or direction while it is on.
+    SpiRunning,
     /// Convert a channel whose pin is not analog.
     NotAnalog,
     /// Start a converter that was switched on less than 3 us ago, or is off.
