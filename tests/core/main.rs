@@ -10,6 +10,7 @@ mod fixed_point;
 mod formats;
 mod fused_recipe;
 mod golden;
+mod half_words;
 mod high_force;
 mod oracle;
 mod pace;

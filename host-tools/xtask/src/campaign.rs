@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 
 use crate::shell::{cargo, hear, root, run};
