@@ -192,7 +192,7 @@ pub enum FingerError {
     #[error("no converter answers (null bit is 1): check power, cable, chip select and SPI mode 0")]
     NullBit,
     #[error(
-        "the load cell reads {0} counts, an end of the range: check its four wires and the converter's data line"
+        "the load cell reads {0} counts, which no sound one does: check its four wires and the converter's data line"
     )]
     Clipped(u16),
     #[error("no part of the finger answers: check its plug, its power and the data line")]

@@ -30,6 +30,8 @@ const PYRO_V_PER_S: f64 = 0.05;
 /// Gain of the INA125, and where its reference pin puts a bridge in balance, V.
 const CELL_GAIN: f64 = 208.0;
 const BALANCE_V: f64 = 1000.0 * SUPPLY_V / 4096.0;
+/// Ends of its output, V: near ground, and 0.8 V below its supply (its data sheet, "Output").
+const SWING_V: (f64, f64) = (0.1, SUPPLY_V - 0.8);
 /// Noise of P_DC, V rms (chosen: 0.3 counts).
 const CELL_NOISE_V: f64 = 0.24e-3;
 
@@ -75,11 +77,13 @@ impl Analog {
         if channel == 0 {
             return between(self.pac_v, fraction) + PAC_NOISE_V * noise.normal();
         }
-        if self.wire_cut {
-            // the amplifier goes to its end (chosen: the lower one)
-            return 0.0;
-        }
+        let (low_v, high_v) = SWING_V;
         let bridge_v = self.cell.ratio(fraction) * SUPPLY_V;
-        BALANCE_V + CELL_GAIN * bridge_v + CELL_NOISE_V * noise.normal()
+        // with an open input the amplifier goes to an end (chosen: the upper one, as nothing presses there)
+        let out_v = match self.wire_cut {
+            true => high_v,
+            false => BALANCE_V + CELL_GAIN * bridge_v,
+        };
+        out_v.clamp(low_v, high_v) + CELL_NOISE_V * noise.normal()
     }
 }
