@@ -235,6 +235,9 @@ impl Tap<Tim<General>> for Pwm {
     }
 }
 
+/// A time, and the encoder's lines where they change then.
+type PinEvent = (u64, Option<(bool, bool)>);
+
 /// TIM4's channels 1 and 2: the stage's encoder. Its edges up to now are counted before every read, each behind the
 /// filter of its input: the model's own filter would take edges that are shown late for spikes.
 #[derive(Debug)]
@@ -291,7 +294,7 @@ impl Encoder {
     }
 
     /// What the pins come to up to now: times, and the encoder's lines where these change.
-    fn events(&mut self, now_ns: u64) -> (Vec<(u64, Option<(bool, bool)>)>, Option<Coupled>) {
+    fn events(&mut self, now_ns: u64) -> (Vec<PinEvent>, Option<Coupled>) {
         let mut rig = lock(&self.rig);
         rig.advance_to(now_ns);
         let mut events: Vec<_> = std::iter::from_fn(|| rig.next_encoder_lines())

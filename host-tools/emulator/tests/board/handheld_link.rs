@@ -334,7 +334,7 @@ fn a_display_that_hangs_costs_no_identification() {
     };
     held.talk.board().hold_display(u32::MAX).unwrap();
     let identify = Request::identify(Identify::default());
-    let found = held.talk.run(identify, LONG_S, |board, report| {
+    let found = held.talk.run(identify, 120.0, |board, report| {
         let Some(Event::Prompt(prompt)) = report.map(|report| &report.event) else {
             return;
         };

@@ -36,7 +36,7 @@ Examples:
   tactus device printer setup --printer COM5 --baud 250000
 
 Each step says what it does next, and waits for a line: y or n. Nothing moves before you have said that the way is free;
-the first approach is at 0.5 mm/s. Ctrl-C lifts the finger; the same command goes on after step 3 if nothing was moved.")]
+the first approach is at 0.5 mm/s. Ctrl-C lifts the finger; the same command goes on if nothing was moved.")]
 pub(crate) struct SetUp {
     #[command(flatten)]
     at: Where,
