@@ -15,8 +15,6 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, PeripheralType, bind_interrupts, flash, peripherals, usart};
 
-use crate::chip::debugger;
-
 bind_interrupts!(pub(crate) struct Irqs {
     USART3 => usart::BufferedInterruptHandler<peripherals::USART3>;
     FLASH => flash::InterruptHandler;
@@ -144,6 +142,12 @@ const LOOKS: u32 = 1000;
 /// The core after its reset.
 pub(crate) const RESET_HZ: u32 = 16_000_000;
 
+/// Has the watchdog count on in a halt again: OpenOCD and st-flash leave it standing at each attach, until the power is
+/// off. With a debugger at the core its tool may have it so.
+pub(crate) fn keep_watchdog() {
+    DBGMCU.apb1fzr().modify(|w| w.set_iwdg(false));
+}
+
 /// Starts the clocks, sets the priorities and hands out the pins. To be called once, first of all. Board tests break it
 /// by its name.
 #[unsafe(export_name = "tactus_board_start")]
@@ -152,7 +156,7 @@ pub(crate) fn start() -> AssignedResources {
     // A debugger that halts the core halts the lever's pulses with it; the stage's PWM goes on, which would stop at
     // either level: at the high one the motor would get all of its supply.
     DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
-    debugger::keep_watchdog();
+    keep_watchdog();
     let external = find_clock();
     let p = embassy_stm32::init(clocks(external));
     start_caches();

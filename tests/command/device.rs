@@ -85,7 +85,7 @@ fn a_session_does_what_was_meant() {
         &["the probe refused", "explore first"],
     );
     // nothing is ever more probable than 1
-    let found = bench.json("identify --threshold 1 --max-slides 6 --seed 7", 3);
+    let found = bench.json("identify --threshold 1 --max-slides 6 --seed 7", 4);
     assert_eq!(
         (&found["among"], &found["verdict"]["told"]),
         (&3.into(), &"undecided".into())

@@ -444,7 +444,7 @@ fn slides_are_selected_by_lot_and_session() {
         match line.strip_suffix(",,,,biotac,,,1,,,") {
             Some(line) => {
                 let slide: u32 = line.split(',').nth(2)?.parse().ok()?;
-                let (lot, day) = if slide % 3 == 0 {
+                let (lot, day) = if slide.is_multiple_of(3) {
                     ("8", "tuesday")
                 } else {
                     ("7", "monday")

@@ -1,15 +1,9 @@
-//! A debugger at the core: a halt leaves the stage's PWM as it is, and its tool may have the watchdog stand meanwhile.
+//! A debugger at the core: a halt leaves the stage's PWM as it is, and its tool may have the watchdog stand meanwhile
+//! (see [`crate::board::keep_watchdog`]).
 use cortex_m::peripheral::DCB;
-use embassy_stm32::pac::DBGMCU;
 
 /// True for an image that drives motors under a debugger, the finger off: built with `TACTUS_DEBUG_MOTORS=1`.
 const MOTORS: bool = option_env!("TACTUS_DEBUG_MOTORS").is_some();
-
-/// Has the watchdog count on in a halt again: OpenOCD and st-flash leave it standing at each attach, until the power is
-/// off. With a debugger at the core its tool may have it so.
-pub(crate) fn keep_watchdog() {
-    DBGMCU.apb1fzr().modify(|w| w.set_iwdg(false));
-}
 
 /// Returns true if one is there, which no motor is to be driven with (C_DEBUGEN, ARMv7-M C1.6.2). Board tests replace
 /// it by its name.

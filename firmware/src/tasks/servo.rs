@@ -94,7 +94,7 @@ impl Pins {
         inputs.stage_limits = (self.stage_left.is_high(), self.stage_right.is_high());
         self.debugged = debugger::is_there();
         if !self.debugged {
-            debugger::keep_watchdog();
+            board::keep_watchdog();
         }
         inputs.e_stop = self.e_stop.is_high() || self.debugged;
         if let Some(now_a) = self.current.amperes() {

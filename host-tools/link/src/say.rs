@@ -28,14 +28,8 @@ pub fn percent(share: f64) -> String {
 
 /// A day as messages, tables and recordings have it, in words; nothing for 0.
 pub fn day(date: u32) -> Option<String> {
-    match date {
-        0 => None,
-        RigCalibration::UNDATED => Some("not known".to_owned()),
-        _ => {
-            let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
-            Some(format!("{year}-{month:02}-{day:02}"))
-        }
-    }
+    let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
+    (date != 0).then(|| format!("{year}-{month:02}-{day:02}"))
 }
 
 /// The requests of a handheld probe to the person who holds it: each once, although the probe repeats it.
@@ -264,9 +258,6 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)
             "force scale",
             match date(c) {
                 None => format!("not measured ({whose}{mn:.1} mN a count)"),
-                Some(day) if c.date == RigCalibration::UNDATED => {
-                    format!("{mn:.2} mN a count, measured on a day {day}")
-                }
                 Some(day) => format!("{mn:.2} mN a count, measured on {day}"),
             },
         ),
@@ -286,12 +277,10 @@ pub(crate) fn calibration_rows(c: &RigCalibration) -> Vec<(&'static str, String)
     ];
     if let Some(day) = turned(c) {
         let mg = c.pressure.pac_pa_per_count;
-        let text = if c.turned == RigCalibration::UNDATED {
-            format!("{mg:.4} mg a count, turned over on a day {day}")
-        } else {
-            format!("{mg:.4} mg a count, turned over on {day}")
-        };
-        rows.push(("accelerometer", text));
+        rows.push((
+            "accelerometer",
+            format!("{mg:.4} mg a count, turned over on {day}"),
+        ));
     }
     rows
 }
@@ -301,15 +290,14 @@ pub(crate) fn show_rows(rows: &[(&str, String)], out: &mut impl Write) -> io::Re
         .try_for_each(|(name, value)| writeln!(out, "{name:<15} {value}"))
 }
 
-/// The day of the force scale: "2026-11-21", "not known" for a probe that was calibrated without a computer; nothing
-/// for a scale that was not measured.
+/// The day of the force scale, "2026-11-21"; nothing for a scale that was not measured.
 pub fn date(c: &RigCalibration) -> Option<String> {
     day(c.scale_day()?)
 }
 
 /// The day on which its accelerometer was turned over, in the same way.
 pub fn turned(c: &RigCalibration) -> Option<String> {
-    day((c.turned != 0).then_some(c.turned)?)
+    day(c.turned)
 }
 
 /// The sensor's serial number.

@@ -40,6 +40,10 @@ const OVER_MM: (f64, f64) = (2.0, 4.0);
 const TILT_MM: f64 = 0.3;
 /// Height of the sample over the bed, mm: beside it there is nothing to touch before.
 const THICK_MM: f64 = 3.0;
+/// Radius of the fingertip, mm: its side touches an edge before its middle is there.
+const TIP_MM: f64 = 7.0;
+/// What slips falls no faster than this, mm/s^2.
+const FALLS_MM_S2: f64 = 9810.0;
 /// The finger's carriage lies on its stop by its weight of 148 g, N, and rubs on its ball slide, N: it moves beyond
 /// that (the book's page of the holder).
 const WEIGHS_N: f64 = 1.45;
@@ -96,6 +100,9 @@ pub struct Printer {
     reversed: [bool; 3],
     scale: [f64; 3],
     missed_mm: [f64; 3],
+    /// What is still to be missed, mm, and how fast it is, mm/s.
+    slips_mm: [f64; 3],
+    slips_mm_s: f64,
     yields_mm_n: f64,
     mount: Mount,
     /// Where the sample begins along x, how high its top is there, and how much it rises for a mm.
@@ -132,6 +139,8 @@ impl Printer {
             reversed: [false; 3],
             scale: [1.0; 3],
             missed_mm: [0.0; 3],
+            slips_mm: [0.0; 3],
+            slips_mm_s: 0.0,
             mount: Mount::weighted(WEIGHS_N, machine.between(RUBS_N.0, RUBS_N.1)),
             step_mm: None,
             bend_mm: 0.0,
@@ -182,7 +191,9 @@ impl Printer {
                 self.missed_mm[axis] += self.planner.place()[axis] * (self.scale[axis] - times);
                 self.scale[axis] = times;
             }
-            PrinterFault::Misses(axis, mm) => self.missed_mm[axis] += mm,
+            PrinterFault::Misses(axis, mm) => {
+                (self.slips_mm[axis], self.slips_mm_s) = (mm, 0.0);
+            }
             PrinterFault::Rises(mm) => self.step_mm = Some((self.x_mm + 1.0, mm)),
             fault => self.firmware.break_now(fault),
         }
@@ -215,14 +226,14 @@ impl Printer {
 
     /// Depth of the sample in the fingertip, mm; negative is a gap.
     pub fn indentation_mm(&self) -> f64 {
-        let mut top = self.top_mm + self.slope * self.x_mm;
+        let inside = self.x_mm.clamp(0.0, LENGTH_MM);
+        let mut top = self.top_mm + self.slope * inside;
         if let Some((from, mm)) = self.step_mm {
             // a ramp of 45 degrees
-            top += mm.min((self.x_mm - from).max(0.0));
+            top += mm.min((inside - from).max(0.0));
         }
-        if !(0.0..=LENGTH_MM).contains(&self.x_mm) {
-            top -= THICK_MM;
-        }
+        let beside = self.x_mm - inside;
+        top -= (beside * beside / (2.0 * TIP_MM)).min(THICK_MM);
         top - self.carriage_mm[2] - self.mount.pushed_mm - self.bend_mm
     }
 
@@ -234,8 +245,13 @@ impl Printer {
         self.ticks += 1;
         self.firmware
             .tick(self.ticks, &mut self.planner, &mut self.noise);
+        self.slips_mm_s += FALLS_MM_S2 * TICK_S;
+        let most = self.slips_mm_s * TICK_S;
         let place = self.planner.place();
         for axis in 0..3 {
+            let slips = self.slips_mm[axis].clamp(-most, most);
+            self.slips_mm[axis] -= slips;
+            self.missed_mm[axis] += slips;
             let sign = if self.reversed[axis] { -1.0 } else { 1.0 };
             let made = place[axis] + self.planner.lost_mm[axis];
             let wanted = sign * self.scale[axis] * made + self.missed_mm[axis];

@@ -17,8 +17,7 @@ pub struct RigCalibration {
     pub unloaded_a: (f32, f32),
     /// Shear per motor current above that, N/A (the paper's inclined stage).
     pub newton_per_ampere: f32,
-    /// Day on which the force per count was measured, as 20261121; [`RigCalibration::UNDATED`] if the day is unknown,
-    /// 0 if it was not measured.
+    /// Day on which the force per count was measured, as 20261121; 0 if it was not measured.
     pub date: u32,
     /// True if P_DC in the air was measured with this finger and is no default.
     pub air_known: bool,
@@ -30,9 +29,6 @@ pub struct RigCalibration {
 }
 
 impl RigCalibration {
-    /// The date of a calibration that a probe made without a computer: it has no clock.
-    pub const UNDATED: u32 = 1;
-
     /// The reference rig's constants with such a finger, until measured ones are read from the store.
     pub const fn unmeasured(finger: &FingerModel) -> Self {
         Self {

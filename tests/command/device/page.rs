@@ -199,7 +199,7 @@ fn a_page_teaches_verifies_trains_and_records() {
     let verified = page.work(verify);
     assert_says(
         &verified.said,
-        &["Is it mine?", "slide 1,", "At this limit"],
+        &["Is it mine?", "slide 1,", "The same as mine."],
     );
     // of a new texture it asks to move the sample before the second trial alone
     let moves = "Move or turn Mine under the finger, so that the next slide is on another track.";

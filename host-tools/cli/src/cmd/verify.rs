@@ -299,7 +299,7 @@ fn reference(
         .as_deref()
         .is_none_or(|m| find_material(&set, m).ok() == Some(index));
     ensure!(
-        !(is_same_folder && same_texture) || !args.only.is_all(),
+        !(is_same_folder && same_texture && args.only.is_all()),
         ITSELF
     );
     // neither the scale nor a part of the reference is learned from what is held against it

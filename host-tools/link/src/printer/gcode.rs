@@ -10,7 +10,7 @@ const OK_OF_RESEND: Duration = Duration::from_millis(40);
 /// Time after an error in which a request to send its line again may come.
 const RESEND_OF_ERROR: Duration = Duration::from_millis(250);
 /// Requests to send a line again, or lines without an answer, that end a session.
-const MOST_RESENDS: u32 = 20;
+const MOST_RESENDS: u32 = 8;
 /// Lines that may be asked for again.
 const KEPT: usize = 8;
 /// Longest line that a printer says.

@@ -63,11 +63,11 @@ fn a_biotac_is_asked_and_read_after_its_gap() {
 fn a_converter_answers_while_it_is_asked() {
     let (wire, counts) = run(FingerName::Analog, 2, |_, mosi| match mosi[1] {
         0xA0 => vec![0xFF, 0xE7, 0xE5],
-        _ => vec![0x00, 0x0A, 0x8F],
+        _ => vec![0x00, 0x06, 0x8F],
     });
     let expected = [[0x01, 0xA0, 0x00], [0x01, 0xE0, 0x00]].map(|b| (0, MODE_0, b.to_vec(), 1));
     assert_eq!(wire, expected);
-    assert_eq!(counts, [Some(2021), Some(2703)]);
+    assert_eq!(counts, [Some(2021), Some(1679)]);
 }
 
 #[test]

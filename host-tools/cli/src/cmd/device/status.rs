@@ -46,8 +46,7 @@ struct Summary<'a> {
 
 #[derive(Serialize)]
 struct CalibrationSummary {
-    /// The day on which the force per count was measured, as "2026-11-21"; "not known" where that was done without a
-    /// computer; `null`: it was not, and is the paper's.
+    /// The day on which the force per count was measured, as "2026-11-21"; `null`: it was not, and is the paper's.
     force_scale_date: Option<String>,
     sensor: Option<String>,
     pdc_in_the_air_counts: f32,
