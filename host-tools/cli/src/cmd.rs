@@ -31,7 +31,7 @@ use tactus_lab::data::printable::Printable;
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
-pub(crate) use printed::say;
+pub(crate) use printed::{say, say_error};
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]
@@ -93,7 +93,14 @@ pub(crate) fn run() -> anyhow::Result<Done> {
     // what others wrote, names and words of a probe, goes out as text
     let out = &mut Printable::new(io::BufWriter::new(printed::Printed(io::stdout())));
     let mut done = Done::Fully;
-    let Tactus { quiet, command } = Tactus::parse();
+    let Tactus { quiet, command } = Tactus::try_parse().unwrap_or_else(|why| {
+        if why.use_stderr() {
+            // what was typed may be a name of others
+            say(why.render().to_string().trim_end());
+            std::process::exit(why.exit_code());
+        }
+        why.exit()
+    });
     if quiet {
         progress::be_quiet();
     }

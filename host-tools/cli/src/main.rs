@@ -12,7 +12,7 @@ fn main() -> ExitCode {
         Ok(cmd::Done::Fully) => ExitCode::SUCCESS,
         Ok(cmd::Done::NotIdentified) => ExitCode::from(3),
         Err(why) => {
-            cmd::say(format_args!("error: {why:#}"));
+            cmd::say_error(&format!("error: {why:#}"));
             match why.downcast_ref::<cmd::BenchError>() {
                 // as a shell has it: 128 and the number of SIGINT
                 Some(why) if why.is_interrupt() => ExitCode::from(130),
