@@ -406,3 +406,71 @@ fn names_with_control_characters_are_refused_and_none_reaches_the_terminal() {
         "{said:?}"
     );
 }
+
+/// A name that is no text, ten thousand times too long, or moves the cursor, is told in a short sentence of plain text;
+/// and nobody is waited for who may never read.
+#[cfg(unix)]
+#[test]
+fn what_is_named_strangely_is_told_in_a_short_plain_sentence() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt as _;
+    let at = good();
+    let manifest = String::from_utf8(at.read("manifest.csv")).unwrap();
+    let row = manifest.lines().nth(1).unwrap();
+    let name = row.split(',').nth(1).unwrap();
+    let long = row.replace(name, &"x".repeat(1_000_000));
+    at.write("long/manifest.csv", manifest.replace(row, &long));
+    at.write("data/felt/1.csv", "a\n1\n");
+    let latin = at.path("").join(OsStr::from_bytes(b"latin/fe\xfflt"));
+    fs::create_dir_all(&latin).unwrap();
+    fs::write(latin.join("1.csv"), "a\n1\n").unwrap();
+    let made = std::process::Command::new("mkfifo")
+        .arg(at.path("pipe"))
+        .status();
+    assert!(made.unwrap().success());
+    let before = files(&at.path("data"));
+    for (line, code, parts) in [
+        (
+            "features --recordings long",
+            1,
+            ["xxx ... xxx", "one number and one name"],
+        ),
+        ("import latin new", 1, ["left out: fe", "not UTF-8; rename"]),
+        (
+            "import data new --rate 500 --unit 'm\u{1b}[2J'",
+            1,
+            ["unit", "U+001B"],
+        ),
+        (
+            "evaluate --threshold 'a\u{202e}\u{1b}[2Jb'",
+            2,
+            ["a\\u202eb", "between 0 and 1"],
+        ),
+        (
+            "learn --recordings . --train-slides 2 --out pipe --force",
+            1,
+            ["pipe", "name a file"],
+        ),
+        (
+            "import . /proc/new",
+            1,
+            ["/proc/new", "make it first, or give another name"],
+        ),
+    ] {
+        let mut bounded = std::process::Command::new("timeout");
+        let command = at.command(line);
+        bounded
+            .arg("60")
+            .arg(command.get_program())
+            .args(command.get_args());
+        let ran = crate::ran(bounded.current_dir(at.path("")));
+        assert_eq!(ran.code, Some(code), "{line}");
+        assert_says(&ran.said, &parts);
+        let plain = |c| !matches!(c, '\u{1b}' | '\u{202e}');
+        assert!(
+            ran.said.len() < 2500 && ran.said.chars().all(plain),
+            "{line}"
+        );
+        assert!(!at.path("new").exists() && files(&at.path("data")) == before);
+    }
+}

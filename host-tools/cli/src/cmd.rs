@@ -31,7 +31,7 @@ use tactus_lab::data::printable::Printable;
 
 pub(crate) use device::BenchError;
 pub(crate) use output::{Done, UsageError};
-pub(crate) use printed::say;
+pub(crate) use printed::{say, say_error};
 
 /// Tactus tells what a surface is by touching it.
 #[derive(Parser)]

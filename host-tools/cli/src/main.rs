@@ -13,7 +13,7 @@ fn main() -> ExitCode {
         Ok(cmd::Done::Different) => ExitCode::from(3),
         Ok(cmd::Done::Unsure) => ExitCode::from(4),
         Err(why) => {
-            cmd::say(format_args!("error: {why:#}"));
+            cmd::say_error(&format!("error: {why:#}"));
             match why.downcast_ref::<cmd::BenchError>() {
                 // as a shell has it: 128 and the number of SIGINT
                 Some(why) if why.is_interrupt() => ExitCode::from(130),

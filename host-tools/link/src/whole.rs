@@ -43,6 +43,11 @@ impl WholeFile {
             return Err(io::Error::new(ErrorKind::IsADirectory, why));
         }
         let (file, part) = if there.as_ref().is_ok_and(|there| !there.is_file()) {
+            if is_named_pipe(path) {
+                let why =
+                    "is a pipe that perhaps nobody reads: name a file, or - for standard output";
+                return Err(io::Error::new(ErrorKind::InvalidInput, why));
+            }
             (OpenOptions::new().write(true).open(path)?, None)
         } else {
             is_free(path, replaces)?;
@@ -84,6 +89,22 @@ impl Write for WholeFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+/// True of a pipe with a place of its own in a folder: to open it would wait for a reader. That of a shell's `>(...)`
+/// has one.
+fn is_named_pipe(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        let there = fs::canonicalize(path).and_then(fs::symlink_metadata);
+        there.is_ok_and(|there| there.file_type().is_fifo())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
     }
 }
 
@@ -146,7 +167,7 @@ impl NewOutputs {
         let missing = path.ancestors().filter(|path| *path != Path::new(""));
         let missing = missing.take_while(|path| fs::symlink_metadata(path).is_err());
         self.folders.extend(missing.map(Path::to_owned));
-        fs::create_dir_all(path)
+        fs::create_dir_all(path).map_err(explained)
     }
 
     /// Notes a file that is made next, unless it is there already: that one is somebody's.

@@ -195,8 +195,8 @@ mod tests {
     fn a_part_whose_registers_do_not_read_back_measures_all_the_same() {
         let mut probe = Moving::over(Ground::Seen(HEIGHT_MM));
         probe.sensor.flow().write_only();
-        let (counts, starting) = probe.moved(25.0, 0.5);
-        assert!(counts > 100 && starting < 10, "{counts} {starting}");
+        let (counts, starting) = probe.moved(25.0, 1.0);
+        assert!(counts > 200 && starting < 10, "{counts} {starting}");
         assert_eq!(probe.fault(), None);
     }
 

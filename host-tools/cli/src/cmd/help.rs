@@ -4,6 +4,7 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{ArgMatches, Command};
 
 use super::names::nearest;
+use super::printed::say;
 
 /// Columns of a narrow terminal.
 const NARROW: usize = 80;
@@ -18,6 +19,11 @@ pub(crate) fn parse(tactus: Command) -> ArgMatches {
         {
             let meant = ContextValue::Strings(vec![meant]);
             why.insert(ContextKind::SuggestedSubcommand, meant);
+        }
+        if why.use_stderr() {
+            // what was typed may be a name of others
+            say(why.render().to_string().trim_end());
+            std::process::exit(why.exit_code());
         }
         why.exit()
     })

@@ -50,6 +50,19 @@ pub(crate) fn say(what: impl Display) {
     let _ = writeln!(Beside, "{}", printable(&what.to_string()));
 }
 
+/// Says what went wrong. Of a text that is too long for people, as a name in a damaged file may be, the middle is left
+/// out: what it is about comes first, what to do last.
+pub(crate) fn say_error(what: &str) {
+    const HALF: usize = 1000;
+    let from_end = what.char_indices().rev().nth(HALF - 1);
+    match (what.char_indices().nth(HALF), from_end) {
+        (Some((begin, _)), Some((end, _))) if begin < end => {
+            say(format_args!("{} ... {}", &what[..begin], &what[end..]));
+        }
+        _ => say(what),
+    }
+}
+
 /// Says what somebody is to enter behind it.
 pub(crate) fn prompt(what: impl Display) {
     let _ = write!(Beside, "{}", printable(&what.to_string()));

@@ -6,6 +6,7 @@ use regex::Regex;
 use serde::{Deserialize, Serialize};
 
 use tactus_core::sensor::FingerCode;
+use tactus_core::table::valid_name;
 
 use super::signals::Signals;
 use crate::data::recordings::files::confined;
@@ -188,6 +189,9 @@ impl Settings {
     /// Refuses what no file can be read with.
     pub(super) fn check(&self) -> std::result::Result<(), String> {
         self.sensor()?;
+        if let Some(unit) = &self.unit {
+            valid_name(unit).map_err(|why| format!("unit {unit:?} {why}"))?;
+        }
         if self.texture.as_ref().is_some_and(|t| t.len() > MAX_PATTERN) {
             return Err(format!(
                 "--texture has more than {MAX_PATTERN} bytes; give a column, or a shorter pattern"

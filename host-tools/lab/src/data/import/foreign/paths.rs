@@ -1,5 +1,6 @@
 //! The files below a folder, and what their paths say.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,8 @@ use crate::data::import::settings::{Named, Pattern, Settings, guessed};
 use crate::data::import::signals::{Signals, not_read};
 use crate::data::recordings::files::{OWN_MANIFEST, confined, open};
 use crate::data::recordings::{RecordingError, Result};
+
+const NOT_TEXT: &str = "a name that is not UTF-8; rename it";
 
 /// Deepest folder below the one that is imported.
 const DEPTH: usize = 8;
@@ -49,10 +52,10 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<(Paths, Vec<Stri
     } = below;
     skipped.sort();
     if !from.is_dir() {
-        let name = from
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        paths.extend(name);
+        match from.file_name().and_then(OsStr::to_str) {
+            Some(name) => paths.push(name.to_owned()),
+            None => skipped.push(NOT_TEXT.to_owned()),
+        }
     }
     paths.sort_by_cached_key(|path| natural(path));
     let pattern = settings.pattern();
@@ -179,7 +182,8 @@ fn walk(folder: &Path, above: &str, depth: usize, below: &mut Below) -> Result<(
     let fault = |why: std::io::Error| RecordingError::at(folder, why);
     for entry in fs::read_dir(folder).map_err(fault)? {
         let entry = entry.map_err(fault)?;
-        let name = entry.file_name().to_string_lossy().into_owned();
+        let bytes = entry.file_name();
+        let name = bytes.to_string_lossy().into_owned();
         if name.starts_with('.') {
             continue;
         }
@@ -188,7 +192,9 @@ fn walk(folder: &Path, above: &str, depth: usize, below: &mut Below) -> Result<(
         let end = plain.rsplit_once('.').map_or("", |(_, end)| end);
         // of the entry itself: what a link leads to is not looked at
         let kind = entry.file_type().map_err(fault)?;
-        let why = if kind.is_dir() {
+        let why = if bytes.to_str().is_none() {
+            Some(NOT_TEXT.to_owned())
+        } else if kind.is_dir() {
             if is_ours(&entry.path()) {
                 Some("recordings of this project; import that folder by itself".to_owned())
             } else if depth < DEPTH {
