@@ -5,6 +5,7 @@ mod critical_section;
 pub(crate) mod current;
 pub(crate) mod debugger;
 mod dsp_kernels;
+pub(crate) mod encoder;
 pub(crate) mod finger;
 pub(crate) mod flash;
 pub(crate) mod lever;

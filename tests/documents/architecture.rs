@@ -18,7 +18,7 @@ host-tools/study core link world lab";
 /// Peripherals that a file may name. First their owners, for which no driver of embassy is used; then files that touch
 /// them at start-up, after a panic, beside a driver, in another image, or to read.
 const PERIPHERALS: &str = "
-chip/current.rs ADC1 ADC123_COMMON DMA2; chip/lever.rs TIM1; chip/motion.rs SPI4
+chip/current.rs ADC1 ADC123_COMMON DMA2; chip/encoder.rs TIM4; chip/lever.rs TIM1; chip/motion.rs SPI4
 chip/slots.rs SPI1 TIM2; chip/watchdog.rs IWDG
 board.rs DBGMCU FLASH RCC; chip/bank2.rs FLASH; chip/rescue.rs RCC
 bench/silicon.rs TIM2; selftest/chip.rs FLASH GPIOA RCC";

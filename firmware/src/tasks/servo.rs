@@ -2,12 +2,11 @@
 //! their way to the features. Lever, stage and guard live in the core; here is only where their pins are.
 use core::sync::atomic::Ordering::Relaxed;
 
+use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Pull, Speed};
-use embassy_stm32::pac::timer::vals::FilterValue;
-use embassy_stm32::peripherals::{PD12, PD13, TIM3, TIM4};
+use embassy_stm32::peripherals::{TIM3, TIM4};
 use embassy_stm32::timer::qei::Qei;
 use embassy_stm32::timer::simple_pwm::SimplePwm;
-use embassy_stm32::{Peri, pac};
 use embassy_time::Timer;
 use heapless::spsc::{Consumer, Producer};
 use tactus_core::probe::RigState;
@@ -22,7 +21,7 @@ use crate::board;
 use crate::chip::current::{self, Current};
 use crate::chip::lever::Lever;
 use crate::chip::slots::Word;
-use crate::chip::{debugger, finger, rescue, watchdog};
+use crate::chip::{debugger, encoder, finger, rescue, watchdog};
 
 /// Without a conversion of the motor's current for so many ms the motor is not driven on.
 const NO_CURRENT_MS: u32 = 10;
@@ -61,7 +60,7 @@ impl Pins {
             pwm: current::pwm(stage.timer, stage.pwm),
             bridge: Output::new(stage.enable, Level::Low, Speed::Low),
             right: Output::new(stage.direction, Level::Low, Speed::Low),
-            encoder: encoder(stage.encoder, stage.encoder_a, stage.encoder_b),
+            encoder: encoder::filtered(stage.encoder, stage.encoder_a, stage.encoder_b),
             count: 0,
             lever_top: switch(switches.lever_top.into()),
             stage_left: switch(switches.stage_left.into()),
@@ -119,21 +118,6 @@ impl Pins {
         });
         self.bridge.set_level(outputs.stage_enabled.into());
     }
-}
-
-/// The encoder's counter behind its filters: a level counts once five samples of 84 MHz / 16 have it, 0.95 us, as the
-/// edges of the bridge beside its wires are on them, too. At 500 mm/s a line keeps its level for 4 us.
-fn encoder(
-    timer: Peri<'static, TIM4>,
-    a: Peri<'static, PD12>,
-    b: Peri<'static, PD13>,
-) -> Qei<'static, TIM4> {
-    let encoder = Qei::new(timer, a, b, Default::default());
-    pac::TIM4.ccmr_input(0).modify(|w| {
-        w.set_icf(0, FilterValue::FDTS_DIV16_N5);
-        w.set_icf(1, FilterValue::FDTS_DIV16_N5);
-    });
-    encoder
 }
 
 #[embassy_executor::task]
