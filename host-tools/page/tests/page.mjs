@@ -241,7 +241,7 @@ test("a probe at a serial port: status, identify, teach, verify, log", () => usb
   await set(it, "u-known", "my own cloth");
   await press(it, "u-verify");
   await idle(it, "it is verified", 150);
-  assert.match(await said(it), /Is it my own cloth\?[^]*At this limit/);
+  assert.match(await said(it), /Is it my own cloth\?[^]*The same as my own cloth/);
   await press(it, "u-log");
   const log = (await kept(it)).get("session.jsonl").toString();
   const lines = log.trimEnd().split("\n").map(line => JSON.parse(line));
