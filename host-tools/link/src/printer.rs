@@ -48,6 +48,12 @@ pub enum PrinterError {
          on? If it is thinner than the one of the set-up: `tactus device printer setup`"
     )]
     NoSample(f64),
+    /// The sample is not where it was, or its ends are not at one height.
+    #[error(
+        "the sample is felt {0:.1} mm higher or lower than it should be: does it lie flat below the whole slide, and does \
+         the axis move as far as it is told (a move of 50 mm, measured with a ruler)? Then run the command again"
+    )]
+    Elsewhere(f64),
     /// The force does not become the one that is wanted.
     #[error(
         "the force does not become {0:.2} N: is the finger's holder loose, or the sample soft?"
@@ -64,7 +70,7 @@ pub enum PrinterError {
         "the printer says that it is at {is:.2} mm, and was told to go to {told:.2} mm: has it an end stop or a limit \
          there?"
     )]
-    Elsewhere {
+    Misplaced {
         /// Where it was told to go, mm.
         told: f64,
         /// Where it says it is, mm.
@@ -139,6 +145,10 @@ struct State {
     parked: bool,
     path: Option<moves::Path>,
     press: Option<Press>,
+    /// When it was lifted after a slide that nothing stopped.
+    lifted: Option<Duration>,
+    /// The sample is not where it was: it presses no more.
+    elsewhere: Option<f64>,
     presses: Vec<Press>,
     measures_backlash: bool,
     /// A person sets it up: orders wait.
@@ -333,6 +343,8 @@ impl Printer {
             ArmTask::Slide => self.slide(order.number).await,
             ArmTask::Lift => {
                 self.lift().await?;
+                let mut state = self.state();
+                state.lifted = Some(state.now);
                 Ok(ArmState::Lifted)
             }
             ArmTask::Stop => {

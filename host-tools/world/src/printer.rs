@@ -11,7 +11,7 @@ mod planner;
 use super::conditions::{TICK_S, TICKS_PER_S};
 use super::finger::Held;
 use super::maths::sin;
-use super::mount::Mount;
+use super::mount::Weight;
 use super::noise::Noise;
 use super::surface::LENGTH_MM;
 use firmware::Firmware;
@@ -44,10 +44,10 @@ const THICK_MM: f64 = 3.0;
 const TIP_MM: f64 = 7.0;
 /// What slips falls no faster than this, mm/s^2.
 const FALLS_MM_S2: f64 = 9810.0;
-/// The finger's carriage lies on its stop by its weight of 148 g, N, and rubs on its ball slide, N: it moves beyond
-/// that (the book's page of the holder).
-const WEIGHS_N: f64 = 1.45;
-const RUBS_N: (f64, f64) = (0.16, 0.40);
+/// The finger's carriage lies on its stop by its weight of 142 g, N, and rubs on its ball slide, N: less than the block
+/// weighs, and what the balls' load adds (the book's page of the holder).
+const WEIGHS_N: f64 = 1.39;
+const RUBS_N: (f64, f64) = (0.05, 0.23);
 /// Axes end there, mm: a screw stalls.
 const ENDS_MM: (f64, f64) = (-30.0, 220.0);
 
@@ -104,7 +104,10 @@ pub struct Printer {
     slips_mm: [f64; 3],
     slips_mm_s: f64,
     yields_mm_n: f64,
-    mount: Mount,
+    /// The finger's carriage; none where it is screwed to its stop.
+    weight: Option<Weight>,
+    /// Height of what carries it, mm.
+    carrier_mm: f64,
     /// Where the sample begins along x, how high its top is there, and how much it rises for a mm.
     begins_mm: f64,
     top_mm: f64,
@@ -141,7 +144,8 @@ impl Printer {
             missed_mm: [0.0; 3],
             slips_mm: [0.0; 3],
             slips_mm_s: 0.0,
-            mount: Mount::weighted(WEIGHS_N, machine.between(RUBS_N.0, RUBS_N.1)),
+            weight: Some(Weight::new(WEIGHS_N, machine.between(RUBS_N.0, RUBS_N.1))),
+            carrier_mm: 0.0,
             step_mm: None,
             bend_mm: 0.0,
             x_mm: 0.0,
@@ -194,7 +198,7 @@ impl Printer {
             PrinterFault::Misses(axis, mm) => {
                 (self.slips_mm[axis], self.slips_mm_s) = (mm, 0.0);
             }
-            PrinterFault::Rises(mm) => self.step_mm = Some((self.x_mm + 1.0, mm)),
+            PrinterFault::Rises(mm) => self.step_mm = Some((self.x_mm + TIP_MM, mm)),
             fault => self.firmware.break_now(fault),
         }
     }
@@ -206,7 +210,7 @@ impl Printer {
 
     /// Screws the finger to its carriage's stop: nothing yields any more.
     pub fn hold_stiffly(&mut self) {
-        self.mount = Mount::STIFF;
+        self.weight = None;
     }
 
     /// Returns how often it was told to heat, to feed filament or to home by itself.
@@ -229,12 +233,14 @@ impl Printer {
         let inside = self.x_mm.clamp(0.0, LENGTH_MM);
         let mut top = self.top_mm + self.slope * inside;
         if let Some((from, mm)) = self.step_mm {
-            // a ramp of 45 degrees
-            top += mm.min((inside - from).max(0.0));
+            // the round tip rolls over its edge
+            let before = (from - inside).max(0.0);
+            let rolls = TIP_MM - (TIP_MM * TIP_MM - before * before).max(0.0).sqrt();
+            top += (mm - rolls).max(0.0);
         }
         let beside = self.x_mm - inside;
         top -= (beside * beside / (2.0 * TIP_MM)).min(THICK_MM);
-        top - self.carriage_mm[2] - self.mount.pushed_mm - self.bend_mm
+        top - self.carrier_mm - self.weight.map_or(0.0, |weight| weight.pushed_mm)
     }
 
     pub(super) fn held(&self) -> Held {
@@ -263,7 +269,11 @@ impl Printer {
         }
         let follows = 0.02;
         self.bend_mm += follows * (self.yields_mm_n * force_n - self.bend_mm);
-        self.mount.tick(force_n);
+        // gantry and screw smooth the microsteps, too
+        self.carrier_mm += follows * (self.carriage_mm[2] + self.bend_mm - self.carrier_mm);
+        if let Some(weight) = &mut self.weight {
+            weight.tick(force_n, self.carrier_mm);
+        }
         let x_mm = self.carriage_mm[0] - self.begins_mm;
         // belt and bed smooth the microsteps
         let moved_mm = (x_mm - self.x_mm) * 0.05;

@@ -104,10 +104,11 @@ impl Carriage {
         one("friction") * 2.0 * pair
     }
 
-    /// The force on a finger that has yielded by `travel` mm, N; of a block with this drag, N.
-    fn force(&self, travel: f64, drag: f64) -> f64 {
-        let cable = self.measures.one("cable_rate") * travel;
-        self.weight() + drag + self.balls() + cable + self.mass * ACCELERATION
+    /// The force on a finger that has yielded by `travel` mm, N.
+    fn force(&self, travel: f64) -> f64 {
+        let one = |name| self.measures.one(name);
+        let rubs = one("drag") + self.balls() + one("cable_rate") * travel;
+        self.weight() + rubs + self.mass * ACCELERATION
     }
 
     /// What a speed adds at the moment at which the finger begins to yield, m/s.
@@ -119,30 +120,21 @@ impl Carriage {
 /// The table of `docs/src/printer.md`.
 pub(super) fn force() -> String {
     let carriage = Carriage::new();
-    let drags = ["drag", "drag_worst"].map(|name| carriage.measures.one(name));
-    let [light, stiff] = drags;
-    let mut text = format!(
-        "| the finger has yielded by | block with a drag of {light:.2} N | of {stiff:.2} N | of {stiff:.2} N, on the \
-         way back |\n|---|---|---|---|\n"
-    );
+    let mut text =
+        "| the finger has yielded by | force | on the way back |\n|---|---|---|\n".to_owned();
     for speed in SPEEDS {
-        let [light, stiff] = drags.map(|drag| carriage.force(0.0, drag) + carriage.blow(speed));
+        let force = carriage.force(0.0) + carriage.blow(speed);
         let speed = speed * 1e3;
-        text +=
-            &format!("| 0 mm, Z comes down at {speed} mm/s | {light:.2} N | {stiff:.2} N | |\n");
+        text += &format!("| 0 mm, Z comes down at {speed} mm/s | {force:.2} N | |\n");
     }
+    let drag = carriage.measures.one("drag");
     for travel in [2.0, 6.0, carriage.measures.one("travel")] {
-        let [light, stiff] = drags.map(|drag| carriage.force(travel, drag));
-        let back = stiff - 2.0 * (drags[1] + carriage.balls());
-        text += &format!("| {travel} mm | {light:.2} N | {stiff:.2} N | {back:.2} N |\n");
+        let force = carriage.force(travel);
+        let back = force - 2.0 * (drag + carriage.balls());
+        text += &format!("| {travel} mm | {force:.2} N | {back:.2} N |\n");
     }
-    let [light, stiff] = drags.map(|drag| {
-        let left = MOST - carriage.force(0.0, drag);
-        left / carriage.blow(1e-3)
-    });
-    text + &format!(
-        "| fastest rise of the sample, or Z, below {MOST} N | {light:.0} mm/s | {stiff:.0} mm/s | |\n"
-    )
+    let fastest = (MOST - carriage.force(0.0)) / carriage.blow(1e-3);
+    text + &format!("| fastest rise of the sample, or Z, below {MOST} N | {fastest:.0} mm/s | |\n")
 }
 
 #[test]
@@ -152,12 +144,12 @@ fn the_holder_cannot_press_harder_than_the_guard_allows() {
     let off = carriage.mass * 1e3 - one("goal");
     assert!(off.abs() < 1.0, "{off} g too much");
     assert!(one("travel") >= 6.0 && one("drop") >= one("travel") + 5.0);
-    let most = carriage.force(0.0, one("drag_worst")) + carriage.blow(SPEEDS[1]);
+    let most = carriage.force(0.0) + carriage.blow(SPEEDS[1]);
     assert!(most < MOST, "{most} N at the stroke's begin");
-    let most = carriage.force(one("travel"), one("drag_worst"));
+    let most = carriage.force(one("travel"));
     assert!(most < MOST, "{most} N at its end");
     // it lies on its stop at the probe's greatest force, and falls back on it
-    let falls = carriage.weight() - one("drag_worst") - carriage.balls();
+    let falls = carriage.weight() - one("drag") - carriage.balls();
     assert!(carriage.weight() > 1.26 * 1.1 && falls > 0.5, "{falls} N");
 }
 

@@ -87,7 +87,7 @@ impl Slide {
 
     /// Errors: the force is too high.
     fn look(&mut self, state: &mut State, since_s: f64) -> Result<()> {
-        // the probe looks for less
+        // the probe's own limit is lower
         let newton = state.felt()?;
         if newton > HARDEST_N {
             return Err(PrinterError::Unsteady(HARDEST_N));
@@ -372,7 +372,7 @@ impl Printer {
             let off = ends
                 .into_iter()
                 .find(|(told, is)| (told - is).abs() > PLACE_OFF_MM);
-            elsewhere = off.map(|(told, is)| PrinterError::Elsewhere { told, is });
+            elsewhere = off.map(|(told, is)| PrinterError::Misplaced { told, is });
             if elsewhere.is_none() {
                 break;
             }
@@ -520,7 +520,7 @@ impl Printer {
         let took = self.now().saturating_sub(begun).as_secs_f64();
         let place = self.done(0.5).await?;
         if (place[axis] - to[0]).abs() > PLACE_OFF_MM {
-            return Err(PrinterError::Elsewhere {
+            return Err(PrinterError::Misplaced {
                 told: to[0],
                 is: place[axis],
             });

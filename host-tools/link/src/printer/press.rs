@@ -15,6 +15,9 @@ const CLEAR_MM: f64 = 0.5;
 const BACK_MM: [f64; 2] = [0.25, 0.12];
 /// A sample rises by this share of its length at most.
 const RISES_MOST: f64 = 0.01;
+/// The plane of a sample that nobody moved is felt again within this, mm; and nobody changes one within this time.
+const SAME_MM: f64 = 0.5;
+const CHANGES: Duration = Duration::from_secs(3);
 /// A sample that rises by more along a slide is followed upwards, mm.
 const RISES_MM: f64 = 0.005;
 /// A way that is shorter may not be made at all (Marlin: MIN_STEPS_PER_SEGMENT of 6), mm.
@@ -120,7 +123,14 @@ impl Printer {
         self.state().path = Some(path);
         self.rise(setup.lifted_mm).await?;
         let light = LIGHT_N.min(0.6 * newton);
-        let known = self.state().press;
+        let (known, is_same) = {
+            let state = self.state();
+            if let Some(off) = state.elsewhere {
+                return Err(PrinterError::Elsewhere(off));
+            }
+            let since = state.lifted.map(|at| state.now.saturating_sub(at));
+            (state.press, since.is_none_or(|since| since < CHANGES))
+        };
         let near = |along: f64| {
             let press = known?;
             Some(press.touched_mm + press.slope * along + CLEAR_MM)
@@ -130,11 +140,23 @@ impl Printer {
             .touch(path.to_mm, near(path.to_mm).unwrap_or(high), light, mm_s)
             .await?;
         self.rise(high).await?;
-        let expected = far + CLEAR_MM + RISES_MOST * (path.to_mm - path.from_mm).abs();
+        let most = RISES_MOST * (path.to_mm - path.from_mm).abs();
+        let expected = far + CLEAR_MM + most;
         let [close, _] = self
             .touch(path.from_mm, expected.min(high), light, mm_s)
             .await?;
         let slope = (far - close) / (path.to_mm - path.from_mm);
+        let at = |press: Press, along: f64| press.touched_mm + press.slope * along;
+        // beside the sample, the finger would be driven against its side
+        let uneven = ((far - close).abs() - most).max(0.0);
+        let off = known.filter(|_| is_same).map_or(uneven, |known| {
+            let far = (far - at(known, path.to_mm)).abs();
+            uneven.max(far).max((close - at(known, path.from_mm)).abs())
+        });
+        if off > SAME_MM {
+            self.state().elsewhere = Some(off);
+            return Err(PrinterError::Elsewhere(off));
+        }
         // a slide goes on in the direction in which the axis has arrived
         let up = far - close > RISES_MM;
         let [_, stiffness_n_mm] = self.trim(path.from_mm, newton, mm_s, up).await?;
