@@ -7,6 +7,7 @@
 //! bytes over anything that reads and writes: a serial line, a TCP connection.
 
 pub mod bringup;
+mod clock;
 mod error;
 pub mod follow;
 pub mod lifting;

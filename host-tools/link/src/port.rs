@@ -3,8 +3,8 @@
 use std::io::{self, Read, Write};
 use std::pin::{Pin, pin};
 use std::task::{Context, Poll, Waker};
-use std::time::Instant;
 
+use super::clock::Clock;
 use super::error::PortError;
 use super::probe::Probe;
 
@@ -14,7 +14,7 @@ use super::probe::Probe;
 pub struct Port<S> {
     pub(super) stream: S,
     probe: Probe,
-    began: Instant,
+    clock: Clock,
 }
 
 impl<S: Read + Write> Port<S> {
@@ -23,7 +23,7 @@ impl<S: Read + Write> Port<S> {
         Self {
             stream,
             probe,
-            began: Instant::now(),
+            clock: Clock::start(),
         }
     }
 
@@ -46,7 +46,7 @@ impl<S: Read + Write> Port<S> {
     pub fn poll<F: Future + ?Sized>(&mut self, operation: Pin<&mut F>) -> Poll<F::Output> {
         let mut context = Context::from_waker(Waker::noop());
         // somebody may have thought about a question since the last time
-        self.probe.carry(&[], self.began.elapsed());
+        self.probe.carry(&[], self.clock.elapsed());
         let polled = operation.poll(&mut context);
         self.turn(polled.is_pending());
         polled
@@ -58,7 +58,7 @@ impl<S: Read + Write> Port<S> {
         match self.exchange(&mut bytes, reads) {
             Ok(length) => {
                 let received = bytes.get(..length).unwrap_or_default();
-                self.probe.carry(received, self.began.elapsed());
+                self.probe.carry(received, self.clock.elapsed());
             }
             Err(why) => self.probe.close(why),
         }

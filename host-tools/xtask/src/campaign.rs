@@ -33,9 +33,9 @@ pub(crate) struct Options {
     /// Seeds of a part that takes them; each has its own default
     #[arg(long, value_name = "A-B", value_parser = range)]
     seeds: Option<RangeInclusive<u64>>,
-    /// Finger of the emulated board in rig and handheld: biotac, analog or mems
-    #[arg(long, value_name = "NAME", default_value = "biotac")]
-    finger: String,
+    /// Finger of the emulated board in rig, handheld and printer: biotac, analog or mems; each has its own default
+    #[arg(long, value_name = "NAME")]
+    finger: Option<String>,
     /// Options of the part
     #[arg(last = true)]
     options: Vec<OsString>,
@@ -53,6 +53,8 @@ enum Part {
     Rig,
     /// Explorations by the handheld on the emulated board, in a hand that differs from seed to seed
     Handheld,
+    /// Explorations by the image of an arm, whose finger mems or analog hangs on a 3D printer, through the command
+    Printer,
     /// The PC's simulated rig, which breaks at any moment of whatever its probe does
     Faults,
     /// All presses of a world, with P_DC sound, dead, dying and leaking; every n-th rig with TACTUS_PRESSES_EVERY
@@ -71,7 +73,7 @@ impl Part {
     fn seeds(self, options: &Options) -> Option<RangeInclusive<u64>> {
         let usual = match self {
             Self::Press => 1..=100,
-            Self::Rig | Self::Handheld => 1..=20,
+            Self::Rig | Self::Handheld | Self::Printer => 1..=20,
             Self::Faults => 1..=300,
             _ => return None,
         };
@@ -136,10 +138,10 @@ fn perform(part: Part, options: &Options) -> Result<String> {
         "{} takes no --seeds",
         part.name()
     );
-    let board = [Part::Rig, Part::Handheld].contains(&part);
+    let board = [Part::Rig, Part::Handheld, Part::Printer].contains(&part);
     ensure!(
-        board || options.finger == "biotac",
-        "--finger is for rig and handheld"
+        board || options.finger.is_none(),
+        "--finger is for rig, handheld and printer"
     );
     match (part, seeds) {
         (Part::Factory, _) => factory::factory(options.options == ["--write"]),
@@ -147,7 +149,9 @@ fn perform(part: Part, options: &Options) -> Result<String> {
         (Part::Faults, Some(seeds)) => faults(&seeds, options),
         (Part::Fuzz, _) => fuzz::fuzz(&options.options),
         (Part::Press, Some(seeds)) => seeds::presses(&seeds),
-        (_, Some(seeds)) => seeds::run(part == Part::Handheld, &seeds, options),
+        (Part::Handheld, Some(seeds)) => seeds::run("handheld", &seeds, options),
+        (Part::Printer, Some(seeds)) => seeds::run("printer", &seeds, options),
+        (_, Some(seeds)) => seeds::run("identify", &seeds, options),
         (_, None) => Ok(String::new()),
     }
 }

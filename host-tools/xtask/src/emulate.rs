@@ -32,9 +32,9 @@ pub(crate) fn emulate(options: &[OsString]) -> Result<()> {
         .partition(|o| o == "--handheld" || o == "--printer");
     let run = match (others.first(), value(&options, "--port")) {
         (Some(other), _) if other == "--printer" => {
-            shell::run(workspace("build").args(["-p", "tactus-probe"]))?;
+            shell::run(&mut command_line())?;
             options.push("--tactus".into());
-            options.push(target().join("debug/tactus").into());
+            options.push(tactus().into());
             "printer"
         }
         (Some(_), _) => "handheld",
@@ -66,11 +66,9 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
         let elf = if help || named {
             None
         } else {
-            let image = match run {
-                "handheld" => HANDHELD,
-                "printer" => ARM,
-                _ if value(options, "--printer-port").is_some() => ARM,
-                _ => RIG,
+            let image = match value(options, "--printer-port") {
+                Some(_) => ARM,
+                None => image_of(run),
             };
             Some(firmware::compile(&[image])?.remove(0))
         };
@@ -87,6 +85,26 @@ pub(crate) fn command(run: &str, options: &[OsString]) -> Result<Command> {
     }
     emulator.args(options);
     Ok(emulator)
+}
+
+/// The image that a run is of.
+pub(crate) fn image_of(run: &str) -> &'static str {
+    match run {
+        "handheld" => HANDHELD,
+        "printer" => ARM,
+        _ => RIG,
+    }
+}
+
+/// Builds the command that a person uses.
+pub(crate) fn command_line() -> Command {
+    let mut build = workspace("build");
+    build.args(["-p", "tactus-probe"]);
+    build
+}
+
+pub(crate) fn tactus() -> PathBuf {
+    target().join("debug/tactus")
 }
 
 pub(crate) fn program(run: &str) -> Command {

@@ -1,6 +1,7 @@
 //! The board's serial port on a TCP port.
 
-use std::io::{ErrorKind, Read as _, Write as _};
+use std::fs::File;
+use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
@@ -97,6 +98,8 @@ pub(super) struct Served {
     pub(super) board: Emulator,
     pub(super) serial: TcpLine,
     pub(super) printer: Option<TcpLine>,
+    /// The board's time is written there, ns.
+    pub(super) clock: Option<File>,
     began: Instant,
     log: bool,
 }
@@ -107,6 +110,7 @@ impl Served {
             board,
             serial,
             printer: None,
+            clock: None,
             began: Instant::now(),
             log,
         }
@@ -136,15 +140,13 @@ impl Served {
         if self.log {
             print_log(board)?;
         }
+        if let Some(clock) = &mut self.clock {
+            clock.rewind()?;
+            clock.write_all(&board.now_ns().to_le_bytes())?;
+        }
         let ahead = Duration::from_nanos(board.now_ns()).saturating_sub(self.began.elapsed());
         std::thread::sleep(ahead);
         Ok(())
-    }
-
-    /// Time by which the board is behind that of this PC.
-    pub(super) fn behind(&self) -> Duration {
-        let board = Duration::from_nanos(self.board.now_ns());
-        self.began.elapsed().saturating_sub(board)
     }
 }
 

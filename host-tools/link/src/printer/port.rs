@@ -7,9 +7,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::{Carrier, Printer, Setup, SetupError};
+use crate::clock::Clock;
 use crate::line::{Line, LineError, open_at};
 use crate::lock::PortLock;
 use crate::whole::write_whole;
@@ -164,7 +165,7 @@ impl Drop for PrinterPort {
 }
 
 fn carry(mut line: Box<dyn Line>, mut carrier: Carrier, ends: &AtomicBool) {
-    let began = Instant::now();
+    let clock = Clock::start();
     let mut bytes = [0; 1024];
     while !ends.load(Relaxed) {
         let came = match line.read(&mut bytes) {
@@ -179,14 +180,14 @@ fn carry(mut line: Box<dyn Line>, mut carrier: Carrier, ends: &AtomicBool) {
         };
         let sent = came.and_then(|length| {
             let received = bytes.get(..length).unwrap_or_default();
-            let send = carrier.carry(received, began.elapsed());
+            let send = carrier.carry(received, clock.elapsed());
             if send.is_empty() {
                 return Ok(());
             }
             line.write_all(&send).and_then(|()| line.flush())
         });
         if let Err(why) = sent {
-            carrier.close(&why.to_string(), began.elapsed());
+            carrier.close(&why.to_string(), clock.elapsed());
             std::thread::sleep(READS);
         }
     }

@@ -108,14 +108,13 @@ fn median_and_worst(mut values: Vec<f64>) -> Option<(f64, f64)> {
     Some(((upper + lower) / 2.0, *values.last()?))
 }
 
-/// Runs all seeds with the rig's image or the handheld's; an error if one failed.
-pub(super) fn run(by_hand: bool, seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
-    let (image, run) = match by_hand {
-        true => (emulate::HANDHELD, "handheld"),
-        false => (emulate::RIG, "identify"),
-    };
+/// Runs all seeds with the image of this run; an error if one failed.
+pub(super) fn run(run: &str, seeds: &RangeInclusive<u64>, options: &Options) -> Result<String> {
     shell::run(&mut emulate::build())?;
-    let elf = firmware::compile(&[image])?.remove(0);
+    let elf = firmware::compile(&[emulate::image_of(run)])?.remove(0);
+    if run == "printer" {
+        shell::run(&mut emulate::command_line())?;
+    }
     let all: Vec<u64> = seeds.clone().collect();
     let ended = shell::each_of(&all, shell::cores(), |seed| {
         let mut command = command(run, *seed, &elf, options);
@@ -150,8 +149,11 @@ fn command(run: &str, seed: u64, elf: &Path, options: &Options) -> Command {
     command.args(["--format", "json", "--seed", &seed.to_string()]);
     command.arg("--elf").arg(elf);
     command
-        .args(["--finger", &options.finger])
+        .args(options.finger.iter().flat_map(|name| ["--finger", name]))
         .args(&options.options);
+    if run == "printer" {
+        command.arg("--tactus").arg(emulate::tactus());
+    }
     command.envs([("RAYON_NUM_THREADS", "1"), ("NO_COLOR", "1")]);
     command
 }
