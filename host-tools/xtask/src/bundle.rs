@@ -1,6 +1,8 @@
 //! `cargo xtask bundle`: a release, with what is flashed, what runs on a PC, and how to check and flash it.
 mod image;
 mod licences;
+pub(crate) mod printed;
+mod trial;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -110,6 +112,7 @@ fn command() -> Result<(String, PathBuf)> {
 pub(crate) fn bundle(options: &Options) -> Result<()> {
     let out = root().join(&options.out);
     let files = files()?;
+    trial::run(&files)?;
     write(&out, &files)?;
     for (name, bytes) in &files {
         println!("{:>9}  {}", bytes.len(), shown(&out.join(name)));
@@ -122,6 +125,7 @@ fn files() -> Result<Files> {
     for elf in firmware::elves()? {
         let (name, bytes) = (firmware::name(&elf)?, read(&elf)?);
         let flat = image::flat(&bytes).with_context(|| name.to_owned())?;
+        files.insert(format!("{name}.hex"), image::hex(&flat).into());
         files.insert(format!("{name}.bin"), flat);
         files.insert(format!("{name}.elf"), bytes);
     }
@@ -131,16 +135,17 @@ fn files() -> Result<Files> {
     for product in PRODUCTS {
         let name = product.name;
         if let Err(why) = (product.lacks)() {
-            if std::env::var("CI").as_deref() == Ok("true") {
-                bail!("a release without the {name}: {why:#}");
-            }
-            shell::skip(&format!("the {name}"), &format!("{why:#}"))?;
+            lacks(name, &why)?;
             continue;
         }
         let (file, built) =
             (product.build)().with_context(|| format!("the {name} is not built"))?;
         files.insert(file, read(&built)?);
         parts.push(product.made_of);
+    }
+    match printed::lacks() {
+        Ok(()) => files.extend(printed::all(tempfile::tempdir()?.path())?),
+        Err(why) => lacks("printed parts", &why)?,
     }
     files.insert(LICENCES.into(), licences::of(&parts)?.into());
     for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
@@ -149,6 +154,14 @@ fn files() -> Result<Files> {
     files.insert("FLASHING.md".into(), flashing().into());
     files.insert(SUMS.into(), sums(&files).into());
     Ok(files)
+}
+
+/// A part that this machine cannot make is left out, but not of a release that CI makes.
+fn lacks(name: &str, why: &anyhow::Error) -> Result<()> {
+    if std::env::var("CI").as_deref() == Ok("true") {
+        bail!("a release without the {name}: {why:#}");
+    }
+    shell::skip(&format!("the {name}"), &format!("{why:#}"))
 }
 
 fn read(file: &Path) -> Result<Vec<u8>> {

@@ -2,6 +2,7 @@
 use anyhow::{Result, ensure};
 use clap::Args;
 
+use crate::bundle::printed;
 use crate::emulate::workspace;
 use crate::shell::{root, run, target};
 
@@ -9,7 +10,8 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask docs            the book as pages, in target/book (needs mdBook)
   cargo xtask docs --check    links, commands, outputs, recordings and generated tables, without mdBook
-  cargo xtask docs --write    writes outputs, recordings and tables again";
+  cargo xtask docs --write    writes outputs, recordings and tables again
+  cargo xtask docs --parts    the printed parts as STL, in target/hardware (needs OpenSCAD)";
 
 #[derive(Args)]
 pub(crate) struct Options {
@@ -19,9 +21,21 @@ pub(crate) struct Options {
     /// Write what is generated from the code instead of building pages
     #[arg(long)]
     write: bool,
+    /// Make the printed parts instead
+    #[arg(long, conflicts_with_all = ["check", "write"])]
+    parts: bool,
 }
 
 pub(crate) fn docs(options: &Options) -> Result<()> {
+    if options.parts {
+        printed::lacks()?;
+        let folder = target().join("hardware");
+        std::fs::create_dir_all(&folder)?;
+        for name in printed::all(&folder)?.into_keys() {
+            println!("{}", folder.join(name).display());
+        }
+        return Ok(());
+    }
     if options.check || options.write {
         return parts(options.write);
     }

@@ -1,4 +1,6 @@
 //! An image in the format that programmers take.
+use std::fmt::Write as _;
+
 use anyhow::{Context as _, Result, bail, ensure};
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{ElfFile, ProgramHeader as _};
@@ -53,9 +55,48 @@ fn joined(loads: &[(u32, &[u8])]) -> Result<Vec<u8>> {
     Ok(image)
 }
 
+/// The same as Intel HEX: records of 16 bytes, each with the sum of its bytes.
+pub(super) fn hex(image: &[u8]) -> String {
+    let record = |text: &mut String, at: u16, kind: u8, data: &[u8]| {
+        let [high, low] = at.to_be_bytes();
+        let mut sum = 0_u8;
+        text.push(':');
+        for byte in [data.len() as u8, high, low, kind].iter().chain(data) {
+            sum = sum.wrapping_sub(*byte);
+            let _ = write!(text, "{byte:02X}");
+        }
+        let _ = writeln!(text, "{sum:02X}");
+    };
+    let mut text = String::new();
+    for (n, bytes) in image.chunks(16).enumerate() {
+        let at = FLASH + 16 * n as u32;
+        if at.trailing_zeros() >= 16 {
+            record(&mut text, 0, 4, &((at >> 16) as u16).to_be_bytes());
+        }
+        record(&mut text, at as u16, 0, bytes);
+    }
+    record(&mut text, 0, 1, &[]);
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Intel's specification, revision A of 1988: types 0, 1 and 4.
+    #[test]
+    fn hex_records_have_their_addresses_and_sums() {
+        let mut image = vec![0xFF; 0x1_0000];
+        image.extend([0x02, 0x33, 0x7A]);
+        let text = hex(&image);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], ":020000040800F2");
+        assert_eq!(lines[2], ":10001000FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF0");
+        assert_eq!(
+            lines[lines.len() - 3..],
+            [":020000040801F1", ":0300000002337A4E", ":00000001FF"]
+        );
+    }
 
     #[test]
     fn variables_lie_behind_the_code_and_gaps_are_erased_flash() {
