@@ -316,6 +316,68 @@ test("a probe at a serial port: status, identify, teach, verify, log", () => usb
   return `${lines.length} lines of log`;
 }));
 
+// Sixteen-bit WAV: noise about a frequency, as loud as this.
+function wav(hz, loud, seed, seconds = 3, rate = 4000) {
+  const bytes = Buffer.alloc(44 + 2 * seconds * rate);
+  bytes.write("RIFF"); bytes.writeUInt32LE(bytes.length - 8, 4); bytes.write("WAVEfmt ", 8); bytes.writeUInt32LE(16, 16); bytes.writeUInt16LE(1, 20); bytes.writeUInt16LE(1, 22);
+  bytes.writeUInt32LE(rate, 24); bytes.writeUInt32LE(2 * rate, 28); bytes.writeUInt16LE(2, 32); bytes.writeUInt16LE(16, 34); bytes.write("data", 36); bytes.writeUInt32LE(2 * seconds * rate, 40);
+  let state = seed, a = 0, b = 0;
+  const turn = 2 * 0.97 * Math.cos(2 * Math.PI * hz / rate);
+  for (let n = 0; n < seconds * rate; n++) {
+    state = Math.imul(state, 1664525) + 1013904223 >>> 0;
+    [a, b] = [turn * a - 0.97 * 0.97 * b + state / 2 ** 31 - 1, a];
+    bytes.writeInt16LE(Math.max(-32767, Math.min(32767, Math.round(loud * a))), 44 + 2 * n);
+  }
+  return bytes;
+}
+const csv = bytes => Buffer.from("time_s,acc_g\n" + Array.from({ length: (bytes.length - 44) / 2 }, (_, n) => `${n / 4000},${bytes.readInt16LE(44 + 2 * n) / 1000}`).join("\n"));
+const give = (it, files) => it.evaluate(`(() => { const to = new DataTransfer(); for (const [name, bytes] of ${JSON.stringify(files.map(([name, bytes]) => [name, bytes.toString("base64")]))}) to.items.add(new File([Uint8Array.from(atob(bytes), c => c.charCodeAt(0))], name));
+  const e = document.getElementById("o-files"); e.files = to.files; e.dispatchEvent(new Event("change")); })()`);
+const verdicts = it => it.evaluate("[...document.querySelectorAll('#o-slides tr')].map(row => [...row.cells].map(cell => cell.textContent))");
+const SOUNDS = [["cork", 150, 200], ["felt", 300, 260], ["silk", 500, 150], ["wool", 800, 300]];
+const sounds = (end, as) => SOUNDS.flatMap(([name, hz, loud], t) => [1, 2, 3, 4].map(n => [`${name}-${n}.${end}`, as(wav(hz, loud * (1 + n / 50), 100 * t + n))]));
+
+for (const [end, as] of [["wav", bytes => bytes], ["csv", csv]]) {
+  test(`recordings of the user's own, as ${end}: map, spectra, and verdicts of tables that have not seen them`, () => opened("#x=1", { motion: "reduce" }, async it => {
+    await press(it, "from-own");
+    // one more cork, in truth another texture: a table that had seen it would know it
+    await give(it, [...sounds(end, as), [`cork-5.${end}`, as(wav(650, 220, 999))]]);
+    await it.until("verdicts", "document.querySelectorAll('#o-slides tr').length > 0 || !document.getElementById('o-problem').hidden");
+    assert.equal(await text(it, "o-problem"), "");
+    assert.match(await text(it, "o-say"), /^16 of 17 right, 1 (new|not sure|wrong), one slide each, by tables that have not seen the recording\.$/);
+    const rows = await verdicts(it);
+    for (const [recording, texture, told] of rows) assert.equal(told === "right", recording !== `cork-5.${end}`, `${recording} ${texture} ${told}`);
+    assert.equal(await it.evaluate("document.querySelectorAll('#map .mark').length"), 17);
+    assert.equal(await it.evaluate("document.querySelectorAll('#map .dot').length"), 4);
+    assert.match(await text(it, "o-what"), /^17 slides of 4 textures .* 4000 Hz/);
+    // of each slide the spectrum is loudest where its sound is
+    for (const { texture, recording, spectrum } of await it.evaluate("tactus.own().slides")) {
+      const hz = recording.startsWith("cork-5") ? 650 : SOUNDS.find(([name]) => name === texture)[1], loudest = (spectrum.indexOf(Math.max(...spectrum)) + 0.5) * 17.19;
+      assert.ok(Math.abs(loudest - hz) < 40, `${recording}: ${loudest} Hz`);
+    }
+    assert.ok(await it.evaluate(`(c => c.getContext("2d").getImageData(0, 0, c.width, c.height).data.some(v => v > 0))(document.getElementById("o-spectra"))`));
+    await looksRight(it, [390, 1280], async (width, scheme) => writeFileSync(join(folder, `screenshot-own-${end}-${width}-${scheme}.png`), await it.screenshot(true)));
+    return text(it, "o-say");
+  }));
+}
+
+test("recordings of the user's own: what cannot be read is said, then it is read with what was asked for", () => opened("#x=1", { motion: "reduce" }, async it => {
+  await press(it, "from-own");
+  await give(it, [["notes.csv", Buffer.from("nothing here")]]);
+  await it.until("it says why", "!document.getElementById('o-problem').hidden");
+  assert.match(await text(it, "o-problem"), /^notes\.csv: /);
+  const bare = sounds("csv", csv).map(([name, bytes]) => [name, Buffer.from(bytes.toString().split("\n").map(line => line.split(",")[1]).join("\n"))]);
+  await give(it, bare);
+  await it.until("it asks for the rate", "/no rate/.test(document.getElementById('o-problem').textContent)");
+  await set(it, "o-rate", "4000");
+  await press(it, "o-again");
+  await it.until("verdicts", "document.querySelectorAll('#o-slides tr').length > 0");
+  assert.match(await text(it, "o-say"), /^16 of 16 right, /);
+  await press(it, "from-sim");
+  await it.until("the probe is back", `${NOW}.known?.textures.length === 20`);
+  assert.equal(await it.evaluate("document.querySelectorAll('#map .mark').length"), 0);
+}));
+
 // The page as it is, at each of these sizes in light and dark: nothing is clipped, every text can be read.
 async function looksRight(it, widths, seen) {
   for (const width of widths) {

@@ -529,20 +529,22 @@
     if (source === "sim" && busy) { try { Probe.ask({ do: "stop" }); } catch { /* nothing was asked for */ } }
     busy = false; playing = false;
     Story.end();
+    delete document.body.dataset.found;
     source = to;
     document.body.dataset.source = to;
     // nothing is known of a probe that is not there
     if (to === "sim") delete document.body.dataset.blank; else { document.body.dataset.blank = ""; at("figures").textContent = ""; known = null; }
-    for (const name of ["sim", "usb"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
+    for (const name of ["sim", "usb", "own"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
     forget();
     Places.likely([]);
     document.body.dataset.told = "";
     verdict = null;
     say("");
     if (to === "sim") return guarded(makeWorld);
+    if (to === "own") return;
     headline(["No probe is connected."]);
   }
-  for (const name of ["sim", "usb"]) at(`from-${name}`).addEventListener("click", () => turn(name));
+  for (const name of ["sim", "usb", "own"]) at(`from-${name}`).addEventListener("click", () => turn(name));
 
   // ---- the beginning
 
@@ -557,6 +559,7 @@
     await Probe.load();
     all = Probe.ask({ do: "textures" }).names;
     Usb.build(outside);
+    Own.build(sentence);
     await makeWorld();
     window.tactus.ready = performance.now() - began;
     before = performance.now();
@@ -571,6 +574,7 @@
   window.tactus = {
     ready: null,
     usb: Usb.now,
+    own: Own.now,
     files: () => Files.kept.map(({ name, bytes }) => ({ name, bytes: [...bytes] })),
     now: () => ({ source, busy, playing, slides, verdict, last, set, known, memory: Probe.bytes() }),
     framesPerSecond: () => frames.length < 2 ? 0 : 1000 * (frames.length - 1) / (frames.at(-1) - frames[0]),
