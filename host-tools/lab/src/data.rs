@@ -1,6 +1,6 @@
 //! Recordings of slides, tables of properties, and what is read from other formats.
 
-#[cfg(feature = "files")]
+#[cfg(feature = "import")]
 pub mod import;
 pub mod json;
 pub mod printable;

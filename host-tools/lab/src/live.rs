@@ -6,6 +6,8 @@
 
 mod message;
 mod monitor;
+#[cfg(feature = "import")]
+mod own;
 mod scene;
 mod session;
 mod slides;
@@ -13,6 +15,8 @@ mod standing;
 
 pub(crate) use message::{Happening, KnownTable};
 pub(crate) use monitor::{ProbeMonitor, Received};
+#[cfg(feature = "import")]
+pub use own::OwnFiles;
 pub use session::Session;
 pub(crate) use session::{asked_in_json, sentence};
 pub use slides::bring_world;

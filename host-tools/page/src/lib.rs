@@ -1,18 +1,19 @@
-//! Tactus in a browser: a simulated probe, [`Session`], and one at a line, [`Remote`], as WebAssembly, asked in JSON.
+//! Tactus in a browser: a simulated probe, [`Session`], one at a line, [`Remote`], and [`OwnFiles`], as WebAssembly, asked in JSON.
 //!
-//! Five functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is
-//! needed: the page writes a request where [`request`] says, calls [`ask`] or [`remote`], and reads the reply where
+//! Seven functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is
+//! needed: the page writes a request where [`request`] says, calls [`ask`], [`remote`] or [`own`], and reads the reply where
 //! [`reply`] says. The module imports nothing.
 
 use std::cell::RefCell;
 
-use tactus_lab::live::Session;
+use tactus_lab::live::{OwnFiles, Session};
 use tactus_lab::remote::Remote;
 
 #[derive(Default)]
 struct Page {
     session: Session,
     remote: Remote,
+    own: OwnFiles,
     request: Vec<u8>,
     reply: String,
 }
@@ -53,6 +54,22 @@ pub extern "C" fn remote() -> usize {
     PAGE.with_borrow_mut(|page| {
         let request = String::from_utf8_lossy(&page.request);
         page.reply = page.remote.ask(&request);
+        page.reply.len()
+    })
+}
+
+/// The request's bytes are the path of a file, which has so many, and then the file: one of the user's own.
+#[unsafe(no_mangle)]
+pub extern "C" fn file(path_length: usize) {
+    PAGE.with_borrow_mut(|page| page.own.take(path_length, &page.request));
+}
+
+/// The same as [`ask`] for the user's own files.
+#[unsafe(no_mangle)]
+pub extern "C" fn own() -> usize {
+    PAGE.with_borrow_mut(|page| {
+        let request = String::from_utf8_lossy(&page.request);
+        page.reply = page.own.ask(&request);
         page.reply.len()
     })
 }

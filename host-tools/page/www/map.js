@@ -104,10 +104,18 @@ const Places = (() => {
     landed.push({ ring, movement: at, now });
   }
 
+  // A slide of a texture, small.
+  function mark(at, place, texture) {
+    if (at === null || !place) return;
+    const [x, y] = inside(scale(place));
+    const ring = Rig.make(svg, "circle", { class: "mark", r: 3, cx: x, cy: y, fill: `hsl(${texture * 137 % 360} 55% 50%)`, visibility: at === movement ? "visible" : "hidden" });
+    landed.push({ ring, movement: at, now: false });
+  }
+
   function clear() {
     for (const one of landed) one.ring.remove();
     landed = [];
   }
 
-  return { build, know, turn, likely, land, clear };
+  return { build, know, turn, likely, land, mark, clear };
 })();

@@ -29,20 +29,74 @@ const Mind = (() => {
     });
     while (list.children.length > shown.length) list.lastChild.remove();
     const rest = order.slice(SHOWN).reduce((sum, [p]) => sum + p, 0);
-    others.textContent = order.length > SHOWN ? `${order.length - SHOWN} others together: ${percent(rest)}` : "";
+    const more = order.length > SHOWN ? `${order.length - SHOWN} others together: ${percent(rest)}. ` : "";
+    others.textContent = `${more}The ${order.length} textures it knows share 100\u00a0%.`;
   }
 
   const movementName = ([force, speed]) => `${force.toFixed(2)} N at ${speed.toFixed(0)} mm/s`;
+
+  // Doubt (eq. 11): the chance that a name drawn by these probabilities is wrong.
+  const doubt = posterior => 1 - posterior.reduce((sum, p) => sum + p * p, 0);
+
+  // From one doubt to another, in words and bits.
+  function halves(now, then) {
+    const bits = Math.log2(now / Math.max(then, 1e-6)), times = bits.toFixed(1);
+    if (!(bits >= 0.05)) return "it stays at " + percent(now);
+    const words = bits < 0.8 ? `${(100 * (1 - then / now)).toFixed(0)}\u00a0% less` : bits < 1.25 ? "halved" : `halved ${times} times`;
+    return `from ${percent(now)} to ${percent(then)}, ${words} (${times}\u00a0${times === "1.0" ? "bit" : "bits"})`;
+  }
 
   function benefit(list, movements, expected, chosen) {
     expected.slice(0, SHOWN).forEach((one, n) => {
       const { item, set } = row(list, n);
       const what = one.property ? `, ${one.property}` : "";
-      set(movementName(movements[one.movement]) + what, one.benefit.toFixed(4), Math.min(1, -Math.log10(Math.max(1e-4, 1 - one.benefit)) / 4));
+      // one that was made before counts less (eq. 13)
+      const again = 1 - one.benefit > one.uncertainty + 0.001 ? ", made before" : "";
+      set(movementName(movements[one.movement]) + what + again, `leaves ${percent(one.uncertainty)}`, Math.min(1, -Math.log10(Math.max(1e-4, 1 - one.benefit)) / 4));
       item.className = one.movement === chosen.movement && one.property === chosen.property ? "chosen" : "";
     });
     while (list.children.length > Math.min(SHOWN, expected.length)) list.lastChild.remove();
   }
 
-  return { posterior, benefit, percent, movementName };
+  // What the shares mean when it says that the texture is new.
+  const insteadOfNew = textures => `The shares are among the ${textures} textures it knows, as if it had to be one of these: who has more than 99\u00a0% is only the least unlike. The scale below says that the slides are too far from all of them: it is new.`;
+
+  // Where the slides lie on the scale: known up to 50 %, changed up to 70 %, then new. The core has a limit for each of the two, and
+  // says how far the slides are over it; far away the scale is compressed.
+  function novelty({ log_odds: over, changed_by: changed }) {
+    if (over > 0) return [70 + 30 * Math.tanh(over / 12), "new"];
+    if (changed > 0) return [50 + 20 * changed / (changed - over || 1), "changed"];
+    return [50 + 50 * Math.tanh((changed ?? over) / 12), "known"];
+  }
+
+  function cells(texts, span) {
+    const row = document.createElement("tr");
+    for (const text of texts) {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      if (span) cell.colSpan = span;
+      row.append(cell);
+    }
+    return row;
+  }
+
+  const fixed = (value, digits, unit = "") => value === null ? "none" : `${value.toFixed(digits)}${unit}`;
+
+  function most(posterior) {
+    let best = 0;
+    posterior.forEach((p, n) => { if (p > posterior[best]) best = n; });
+    return best;
+  }
+
+  // Traction, roughness and fineness as text.
+  const measured = m => [fixed(m.traction_n, 2, " N"), fixed(m.roughness_ln, 2),
+    fixed(m.fineness_ln, 2, m.fineness_ln === null ? "" : `, ${Math.exp(m.fineness_ln).toFixed(0)}\u00a0Hz`)];
+
+  // The row of a slide.
+  function slide({ slide: number, measured: m, early_ms: early, standing }, known) {
+    const best = most(standing.posterior), ended = early ? `, ended after ${early / 1000} s` : "";
+    return cells([String(number), movementName([m.force_n, m.speed_mm_s]) + ended, ...measured(m), `${known.textures[best]}, ${percent(standing.posterior[best])}`]);
+  }
+
+  return { cells, slide, measured, most, posterior, benefit, percent, movementName, doubt, halves, insteadOfNew, novelty };
 })();

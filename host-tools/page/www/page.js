@@ -13,7 +13,7 @@
   let all = [];
   let source = "sim";
   let playing = false, busy = false, asked = null, slides = 0, last = null, verdict = null;
-  let frames = [], began = performance.now();
+  let isTold = false, frames = [], began = performance.now();
   const ink = document.createElement("span");
   ink.hidden = true;
   document.body.append(ink);
@@ -46,9 +46,11 @@
   }
 
   function enable(on) {
-    for (const id of ["play", "step", "surprise", "move", "apply", "learn", "confirm", "again", "worn"]) at(id).disabled = !on;
+    for (const id of ["play", "step", "replay", "surprise", "move", "apply", "learn", "confirm", "again", "worn"]) at(id).disabled = !on;
     at("unknown").disabled = !on || known === null || known.textures.length >= 117;
     at("play").textContent = playing && busy ? "Pause" : busy ? "Go on" : "Start";
+    at("tale-pause").textContent = playing ? "Pause" : "Go on";
+    at("tale-pause").hidden = !busy;
   }
 
   // ---- the world
@@ -85,32 +87,21 @@
   function knows(now) {
     known = now;
     Places.know(known);
-    choices();
-    Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
-    at("figures").textContent = `The table: ${known.textures.length} textures, ${(known.bytes / 1024).toFixed(0)} KB, checksum ${known.crc.toString(16).padStart(8, "0")}. ${known.figures ?? ""}`;
+    Settings.choices(at("texture"), all, known, set.x);
+    even();
+    at("figures").textContent = `The table: ${known.textures.length} textures, ${(known.bytes / 1024).toFixed(0)} KB, checksum ${known.crc.toString(16).padStart(8, "0")} (tells it from other tables). ${known.figures ?? ""}`;
   }
 
-  function choices() {
-    const list = at("texture");
-    const option = number => new Option(nameOf(number), number);
-    const group = (label, numbers) => {
-      const element = document.createElement("optgroup");
-      element.label = label;
-      element.append(...numbers.map(option));
-      return element;
-    };
-    const numbers = all.map((_, n) => n + 1).sort((a, b) => nameOf(a).localeCompare(nameOf(b), "en"));
-    const unknown = numbers.filter(number => !isKnown(number));
-    list.replaceChildren(group("It knows", numbers.filter(isKnown)));
-    if (unknown.length) list.append(group("It does not know", unknown));
-    if (set.x > 0) list.value = set.x;
+  function even() {
+    posterior = known.textures.map(() => 1 / known.textures.length);
+    Mind.posterior(at("posterior"), at("others"), known.textures, posterior);
   }
 
   function forget() {
     slides = 0;
     Places.clear();
     Traces.clear();
-    at("slides").replaceChildren(cells(["None yet."], 6));
+    at("slides").replaceChildren(Mind.cells(["None yet."], 6));
     at("benefit").replaceChildren();
     at("novel").classList.remove("known");
     at("teach").hidden = true;
@@ -130,10 +121,10 @@
     if (!busy) return;
     verdict = null;
     document.body.dataset.told = "";
-    Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
+    even();
     Places.likely([]);
     headline(["What is this?"]);
-    Settings.write(set);
+    if (!Story.isOn()) Settings.write(set);
   }
 
   function begin(number, request) {
@@ -152,7 +143,8 @@
     lock();
   }
 
-  const sentence = why => { const text = why.message; return `${text[0].toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`; };
+  // A name of a file keeps its letters.
+  const sentence = ({ message: text }) => `${/^\S+\.\w/.test(text) ? text[0] : text[0].toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
 
   // While it is at work, what would disturb it waits.
   function lock() {
@@ -174,33 +166,15 @@
 
   // ---- what happens
 
-  function cells(texts, span) {
-    const row = document.createElement("tr");
-    for (const text of texts) {
-      const cell = document.createElement("td");
-      cell.textContent = text;
-      if (span) cell.colSpan = span;
-      row.append(cell);
-    }
-    return row;
-  }
-
-  const fixed = (value, digits, unit = "") => value === null ? "none" : `${value.toFixed(digits)}${unit}`;
-
-  function most(posterior) {
-    let best = 0;
-    posterior.forEach((p, n) => { if (p > posterior[best]) best = n; });
-    return best;
-  }
-
   function stands(standing) {
     if (!standing) return;
+    posterior = standing.posterior;
     Mind.posterior(at("posterior"), at("others"), known.textures, standing.posterior);
     Places.likely(standing.posterior);
     const novel = standing.log_odds !== null;
     at("novel").classList.toggle("known", novel);
     if (novel) {
-      const [place, zone] = novelty(standing);
+      const [place, zone] = Mind.novelty(standing);
       at("needle").style.left = `${place}%`;
       const meter = at("novel-meter");
       meter.setAttribute("aria-valuenow", place.toFixed(0));
@@ -209,42 +183,33 @@
     }
   }
 
-  // Where the slides lie on the scale: known up to 50 %, changed up to 70 %, then new. The core has a limit for each of the two, and
-  // says how far the slides are over it; far away the scale is compressed.
-  function novelty({ log_odds: over, changed_by: changed }) {
-    if (over > 0) return [70 + 30 * Math.tanh(over / 12), "new"];
-    if (changed > 0) return [50 + 20 * changed / (changed - over || 1), "changed"];
-    return [50 + 50 * Math.tanh((changed ?? over) / 12), "known"];
-  }
-
   function happened(one) {
     switch (one.what) {
-      case "chosen":
+      case "chosen": {
         if (slides === 0 && one.slide === 1) Places.clear();
         Mind.benefit(at("benefit"), known.movements, one.expected, one);
         Places.turn(one.movement);
-        at("why").textContent = `Chosen for slide ${one.slide}: ${Mind.movementName(known.movements[one.movement])}${one.property ? `, for ${one.property}` : ""}. It should take away the most doubt; each quarter of a bar is a factor of ten.`;
+        const { uncertainty } = one.expected.find(each => each.movement === one.movement && each.property === one.property);
+        at("why").textContent = `Chosen for slide ${one.slide}: ${Mind.movementName(known.movements[one.movement])}${one.property ? `, for ${one.property}` : ""}. Doubt is the chance that a name drawn by the shares is wrong; this movement should bring it ${Mind.halves(Mind.doubt(posterior), uncertainty)}. One bit halves the doubt. A bar is longer by a quarter for each factor of ten.`;
         break;
+      }
       case "look":
         stands(one.standing);
         Places.land(source !== "sim" || asked?.by === "identify" ? lookedAt : null, one.place, true);
-        if (one.standing) say(`After ${one.ms / 1000} s of sliding: most like ${known.textures[most(one.standing.posterior)]}.`);
+        if (one.standing) say(`After ${one.ms / 1000} s of sliding: most like ${known.textures[Mind.most(one.standing.posterior)]}.`);
         break;
       case "slide": {
         stands(one.standing);
         Places.land(one.movement, one.place, false);
         if (slides === 0) at("slides").replaceChildren();
         slides += 1;
-        const best = most(one.standing.posterior), m = one.measured;
-        const early = one.early_ms ? `, ended after ${one.early_ms / 1000} s` : "";
-        at("slides").append(cells([String(one.slide), Mind.movementName([m.force_n, m.speed_mm_s]) + early, fixed(m.traction_n, 2, " N"),
-          fixed(m.roughness_ln, 2), fixed(m.fineness_ln, 2), `${known.textures[best]}, ${Mind.percent(one.standing.posterior[best])}`]));
+        at("slides").append(Mind.slide(one, known));
         break;
       }
       case "moved": {
-        const m = one.measured;
+        const [traction, roughness, fineness] = Mind.measured(one.measured);
         Places.land(one.movement, one.place, false);
-        at("moved").textContent = `Measured: traction ${fixed(m.traction_n, 2, " N")}, roughness ${fixed(m.roughness_ln, 2)}, fineness ${fixed(m.fineness_ln, 2)}. ${one.movement === null ? "The probe has learned nothing at this movement, so the map has no place for it." : "The ring in the map is this slide."}`;
+        at("moved").textContent = `Measured: traction ${traction}, roughness ${roughness}, fineness ${fineness}. ${one.movement === null ? "The probe has learned nothing at this movement, so the map has no place for it." : "The ring in the map is this slide."}`;
         headline(["Measured by hand."]);
         break;
       }
@@ -288,8 +253,9 @@
         break;
     }
     if (one.what === "chosen") lookedAt = one.movement;
+    if (source === "sim") Story.happened(one, known, posterior);
   }
-  let lookedAt = null;
+  let lookedAt = null, posterior = [];
 
   const sure = p => p >= 0.9995 ? "more than\u00a099.9\u00a0%" : Mind.percent(p);
 
@@ -298,7 +264,10 @@
     const name = { name: one.texture };
     if (one.told === "sure") headline(["It is ", name, `, ${sure(one.probability)} sure ${of}.`], "sure");
     if (one.told === "changed") headline(["It is ", name, `, but not as I learned it: ${sure(one.probability)} sure ${of}.`], "changed");
-    if (one.told === "new") headline([`This is none of those I know, ${of}.`], "new");
+    if (one.told === "new") {
+      headline([`This is none of those I know, ${of}.`], "new");
+      at("others").textContent = Mind.insteadOfNew(known.textures.length);
+    }
     if (one.told === "most-like") headline(["It is most like ", name, `, ${Mind.percent(one.probability)} among those I know ${of}.`]);
     if (one.told === "undecided") headline(["Not sure; most likely ", name, `, ${Mind.percent(one.probability)} ${of}.`]);
     if (source !== "sim") {
@@ -356,6 +325,7 @@
     at("g-time").textContent = `${(frame.at_ms / 1000).toFixed(1)} s`;
     if (busy && frame.phase !== shownPhase) {
       shownPhase = frame.phase;
+      Story.phase(frame.phase);
       say(sentences[frame.phase] ?? "");
       Rig.say(sentences[frame.phase] ?? "");
     }
@@ -369,15 +339,15 @@
     if (playing && busy) {
       frames.push(now);
       if (frames.length > 240) frames.shift();
-      owed += passed * speedNow(last?.phase);
+      owed += Story.holds(passed) ? 0 : passed * speedNow(last?.phase);
       let ms = Math.min(500, Math.floor(owed));
       owed -= ms;
       // a slide does not begin in the middle of a quick step
-      while (ms > 0 && busy) {
+      while (ms > 0 && busy && !Story.holds(0)) {
         const part = Math.min(ms, 40), phase = last?.phase;
         take(Probe.ask({ do: "step", ms: part }));
         ms -= part;
-        if (last.phase !== phase && speedNow(last.phase) < speedNow(phase)) { owed = 0; break; }
+        if (last.phase !== phase && (Story.isOn() || speedNow(last.phase) < speedNow(phase))) { owed = 0; break; }
       }
       if (last) show(last);
     }
@@ -387,7 +357,7 @@
 
   function onwards() {
     // to the end of the next slide, at once
-    if (!busy) return surprise();
+    if (!busy) return then(surprise)();
     playing = false;
     for (let n = 0; n < 4000 && busy; n++) {
       take(Probe.ask({ do: "step", ms: 50 }));
@@ -400,35 +370,14 @@
 
   // ---- controls
 
-  function outputs() {
-    at("o-count").textContent = at("count").value;
-    at("o-threshold").textContent = Settings.share(Settings.THRESHOLDS[at("threshold").value]);
-    at("o-alarm").textContent = Settings.share(Settings.ALARMS[at("alarm").value]);
-    at("o-drift").textContent = Settings.driftName(Number(at("drift").value));
-    at("o-force").textContent = `${Number(at("force").value).toFixed(2)} N`;
-    at("o-mms").textContent = `${at("mms").value} mm/s`;
-    const wear = Number(at("wear").value);
-    at("o-wear").textContent = wear === 0 ? "new" : wear === 1 ? "no ridges left" : `${Math.round(100 * wear)} % gone`;
-  }
-
-  function controls() {
-    at("count").value = set.n;
-    at("method").value = set.paper ? "paper" : "fused";
-    at("threshold").value = Settings.THRESHOLDS.indexOf(set.t);
-    at("alarm").value = Settings.ALARMS.indexOf(set.fa);
-    at("drift").value = set.d;
-    at("world").value = set.world;
-    at("wear").value = set.wear;
-    at("speed").value = set.speed;
-    outputs();
-  }
-
   async function apply() {
     if (busy) return;
     const world = Math.round(Number(at("world").value));
     if (!(world >= 1 && world <= 9999)) return problem("The world is a number from 1 to 9999.");
     set = { ...set, n: Number(at("count").value), paper: at("method").value === "paper", d: Number(at("drift").value), world };
     lessons.clear();
+    isTold = false;
+    Story.end();
     Settings.write(set);
     await guarded(makeWorld);
   }
@@ -444,15 +393,44 @@
     }
   }
 
-  at("play").addEventListener("click", () => {
+  function play() {
+    if (!busy && isTold && verdict === null) return tell();
     if (!busy) return at("texture").value ? identify(Number(at("texture").value)) : surprise();
     playing = !playing;
     enable(true);
     lock();
+  }
+
+  // The first visit's exploration, in a world as made for it.
+  function tell() {
+    Story.begin(nameOf(set.x), known.textures.length);
+    identify(set.x);
+  }
+
+  // After the story the probe is the usual one again.
+  const then = work => async () => {
+    if (isTold && !busy && known) await guarded(async () => {
+      isTold = false;
+      Story.end();
+      set = { ...set, paper: false };
+      Settings.controls(set);
+      await makeWorld();
+    });
+    work();
+  };
+
+  // The same exploration again, from the same beginning, unless it was taught something.
+  const replay = () => guarded(async () => {
+    if (busy && lessons.size) return;
+    if (!lessons.size) await makeWorld();
+    if (isTold) tell(); else identify(set.x);
   });
+
+  for (const id of ["play", "tale-pause"]) at(id).addEventListener("click", () => busy || verdict === null ? play() : then(play)());
+  for (const id of ["replay", "tale-again"]) at(id).addEventListener("click", replay);
   at("step").addEventListener("click", onwards);
-  at("surprise").addEventListener("click", surprise);
-  at("unknown").addEventListener("click", unknown);
+  for (const id of ["surprise", "tale-more"]) at(id).addEventListener("click", then(surprise));
+  at("unknown").addEventListener("click", then(unknown));
   at("speed").addEventListener("change", () => { set.speed = at("speed").value; owed = 0; Settings.write(set); });
   at("texture").addEventListener("change", () => { set.x = Number(at("texture").value); Settings.write(set); });
   at("move").addEventListener("click", () => {
@@ -475,7 +453,7 @@
       Settings.write(set);
     });
   }
-  for (const id of ["count", "threshold", "alarm", "drift", "force", "mms", "wear"]) at(id).addEventListener("input", outputs);
+  for (const id of ["count", "threshold", "alarm", "drift", "force", "mms", "wear"]) at(id).addEventListener("input", Settings.outputs);
   at("apply").addEventListener("click", apply);
   at("teach").addEventListener("submit", event => {
     event.preventDefault();
@@ -494,13 +472,13 @@
       at("linked").textContent = "The address of this page is the link: copy it from there.";
     }
   });
-  at("worn").addEventListener("click", () => {
+  at("worn").addEventListener("click", then(() => {
     if (busy || !known) return;
     at("wear").value = Math.min(1, Number(at("wear").value) + Number(at("wear").step));
-    outputs();
+    Settings.outputs();
     at("wear").dispatchEvent(new Event("change"));
     identify(set.x || known.numbers.find(number => number !== null));
-  });
+  }));
   addEventListener("resize", Traces.again);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", Traces.again);
 
@@ -528,7 +506,7 @@
       document.body.dataset.told = "";
       verdict = null;
       Places.likely([]);
-      if (known) Mind.posterior(at("posterior"), at("others"), known.textures, known.textures.map(() => 1 / known.textures.length));
+      if (known) even();
       headline(["What is this?"]);
     },
     happened,
@@ -550,25 +528,29 @@
     if (to === source) return;
     if (source === "sim" && busy) { try { Probe.ask({ do: "stop" }); } catch { /* nothing was asked for */ } }
     busy = false; playing = false;
+    Story.end();
+    delete document.body.dataset.found;
     source = to;
     document.body.dataset.source = to;
     // nothing is known of a probe that is not there
     if (to === "sim") delete document.body.dataset.blank; else { document.body.dataset.blank = ""; at("figures").textContent = ""; known = null; }
-    for (const name of ["sim", "usb"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
+    for (const name of ["sim", "usb", "own"]) at(`from-${name}`).setAttribute("aria-pressed", String(name === to));
     forget();
     Places.likely([]);
     document.body.dataset.told = "";
     verdict = null;
     say("");
     if (to === "sim") return guarded(makeWorld);
+    if (to === "own") return;
     headline(["No probe is connected."]);
   }
-  for (const name of ["sim", "usb"]) at(`from-${name}`).addEventListener("click", () => turn(name));
+  for (const name of ["sim", "usb", "own"]) at(`from-${name}`).addEventListener("click", () => turn(name));
 
   // ---- the beginning
 
   async function start() {
-    controls();
+    if (!location.hash) { set = { ...Story.FIRST }; isTold = true; }
+    Settings.controls(set);
     Rig.build(at("rig"));
     Places.build(at("map"));
     // the first picture before the work
@@ -577,13 +559,14 @@
     await Probe.load();
     all = Probe.ask({ do: "textures" }).names;
     Usb.build(outside);
+    Own.build(sentence);
     await makeWorld();
     window.tactus.ready = performance.now() - began;
     before = performance.now();
     requestAnimationFrame(tick);
     // someone who wants no motion begins it
     if (!matchMedia("(prefers-reduced-motion: reduce)").matches) {
-      if (set.x > 0) identify(set.x); else surprise();
+      if (isTold) tell(); else if (set.x > 0) identify(set.x); else surprise();
     }
   }
 
@@ -591,6 +574,7 @@
   window.tactus = {
     ready: null,
     usb: Usb.now,
+    own: Own.now,
     files: () => Files.kept.map(({ name, bytes }) => ({ name, bytes: [...bytes] })),
     now: () => ({ source, busy, playing, slides, verdict, last, set, known, memory: Probe.bytes() }),
     framesPerSecond: () => frames.length < 2 ? 0 : 1000 * (frames.length - 1) / (frames.at(-1) - frames[0]),

@@ -39,5 +39,47 @@ const Settings = (() => {
 
   const driftName = d => d === 0 ? "none" : d === 1 ? "usual" : `${d} times the usual`;
   const share = p => `${+(100 * p).toFixed(2)} %`;
-  return { THRESHOLDS, ALARMS, read, write, driftName, share };
+  // ---- what the controls show
+
+  const element = id => document.getElementById(id);
+  function outputs() {
+    element("o-count").textContent = element("count").value;
+    element("o-threshold").textContent = share(THRESHOLDS[element("threshold").value]);
+    element("o-alarm").textContent = share(ALARMS[element("alarm").value]);
+    element("o-drift").textContent = driftName(Number(element("drift").value));
+    element("o-force").textContent = `${Number(element("force").value).toFixed(2)} N`;
+    element("o-mms").textContent = `${element("mms").value} mm/s`;
+    const wear = Number(element("wear").value);
+    element("o-wear").textContent = wear === 0 ? "new" : wear === 1 ? "no ridges left" : `${Math.round(100 * wear)} % gone`;
+  }
+
+  function controls(set) {
+    element("count").value = set.n;
+    element("method").value = set.paper ? "paper" : "fused";
+    element("threshold").value = THRESHOLDS.indexOf(set.t);
+    element("alarm").value = ALARMS.indexOf(set.fa);
+    element("drift").value = set.d;
+    element("world").value = set.world;
+    element("wear").value = set.wear;
+    element("speed").value = set.speed;
+    outputs();
+  }
+
+  function choices(list, all, known, chosen) {
+    const nameOf = number => all[number - 1], isKnown = number => known.numbers.includes(number);
+    const option = number => new Option(nameOf(number), number);
+    const group = (label, numbers) => {
+      const element = document.createElement("optgroup");
+      element.label = label;
+      element.append(...numbers.map(option));
+      return element;
+    };
+    const numbers = all.map((_, n) => n + 1).sort((a, b) => nameOf(a).localeCompare(nameOf(b), "en"));
+    const unknown = numbers.filter(number => !isKnown(number));
+    list.replaceChildren(group("It knows", numbers.filter(isKnown)));
+    if (unknown.length) list.append(group("It does not know", unknown));
+    if (chosen > 0) list.value = chosen;
+  }
+
+  return { THRESHOLDS, ALARMS, read, write, outputs, controls, choices };
 })();

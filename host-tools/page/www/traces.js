@@ -98,6 +98,17 @@ const Traces = (() => {
     return stops[n].map((from, k) => from + (stops[n + 1][k] - from) * part);
   }
 
+  // Spectra as rows, the first one above.
+  function rows(canvas, all) {
+    canvas.style.height = `${Math.min(480, Math.max(96, 6 * all.length))}px`;
+    const { context, wide, high } = surface(canvas), low = Math.min(...all.flat()), span = Math.max(1, Math.max(...all.flat()) - low);
+    const small = new OffscreenCanvas(ROWS, all.length), image = new ImageData(ROWS, all.length), dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    all.forEach((one, row) => one.forEach((db, n) => image.data.set([...shade((db - low) / span, dark), 255], 4 * (row * ROWS + n))));
+    small.getContext("2d").putImageData(image, 0, 0);
+    context.imageSmoothingEnabled = false;
+    context.drawImage(small, 0, 0, wide, high);
+  }
+
   function draw(canvases) {
     if (!changed) return;
     changed = false;
@@ -112,5 +123,5 @@ const Traces = (() => {
     heat(canvases.spectrum, matchMedia("(prefers-color-scheme: dark)").matches);
   }
 
-  return { take, clear, draw, again: () => { changed = true; } };
+  return { take, clear, draw, rows, again: () => { changed = true; } };
 })();

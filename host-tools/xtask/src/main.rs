@@ -93,7 +93,11 @@ enum Cli {
     /// One file without any network: a double click opens it. Builds for WebAssembly with the active Rust toolchain if
     /// that has the target wasm32-unknown-unknown (`rustup target add wasm32-unknown-unknown`), otherwise with Debian's
     /// packages.
-    Page,
+    Page {
+        /// Make the README's film of it, too: docs/src/page.webp; needs Chromium and Node.js
+        #[arg(long)]
+        film: bool,
+    },
     /// Build the book, or check and write what is generated in README and book
     #[command(after_help = docs::EXAMPLES)]
     Docs(docs::Options),
@@ -117,7 +121,7 @@ fn main() -> ExitCode {
         Cli::Bench(options) => bench::bench(&options),
         Cli::Size => size::size(),
         Cli::Flash(options) => flash::flash(&options),
-        Cli::Page => page::page(),
+        Cli::Page { film } => page::page(film),
         Cli::Docs(options) => docs::docs(&options),
         Cli::Bundle(options) => bundle::bundle(&options),
     };

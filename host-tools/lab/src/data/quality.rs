@@ -84,7 +84,7 @@ impl Fingerprint {
     }
 
     /// That of a signal of any sensor, whose sign does not count.
-    #[cfg(feature = "files")]
+    #[cfg(feature = "import")]
     pub(crate) fn of_signal(samples: &[f64], rate_hz: f64) -> Self {
         Self::of_samples(samples.iter().map(|x| x.abs().to_bits()), rate_hz)
     }

@@ -325,7 +325,7 @@ impl RecordingSet {
 }
 
 /// True if a folder has a manifest, or recordings that are not whole.
-#[cfg(feature = "files")]
+#[cfg(feature = "import")]
 pub(crate) fn is_there(folder: &Path) -> bool {
     let manifests = [
         files::OWN_MANIFEST,

@@ -218,11 +218,15 @@ impl ProbeMonitor {
 fn spectrum(samples: &[i16]) -> Option<Vec<i8>> {
     let mut sum = SpectrumSum::default();
     sum.push(&PLAN, samples);
-    let spectrum = sum.finish()?;
-    let bins = spectrum.psd().get(1..)?.chunks_exact(BINS);
+    Some(decibels(sum.finish()?.psd()))
+}
+
+/// A spectrum in dB per four bins, of those over 0 Hz.
+pub(super) fn decibels(psd: &[f32]) -> Vec<i8> {
+    let bins = psd.get(1..).unwrap_or_default().chunks_exact(BINS);
     let db = |bins: &[f32]| {
         let mean = bins.iter().sum::<f32>() / BINS as f32;
         libm::roundf(10.0 * libm::log10f(mean + 1e-3)) as i8
     };
-    Some(bins.map(db).collect())
+    bins.map(db).collect()
 }

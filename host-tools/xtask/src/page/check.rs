@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::build::{CRATE, build};
+use super::build::{Built, CRATE, build};
 use crate::emulate;
 use crate::shell::{root, run, skip, target};
 use crate::toolchain::{self, BROWSER};
@@ -48,6 +48,14 @@ pub(crate) fn check() -> Result<()> {
     tests.arg(root().join(CRATE).join("tests").join("page.mjs"));
     tests.args([page, wasm, &native]);
     run(tests.args([browser, &probe.address])).context("the page is not as it should be")
+}
+
+/// Makes the README's film: the first visit, in Chromium.
+pub(super) fn film(built: &Built) -> Result<()> {
+    let mut film = Command::new("node");
+    film.arg(root().join(CRATE).join("tests").join("film.mjs"));
+    film.arg(&built.page).arg(browser()?);
+    run(film.arg(root().join("docs/src/page.webp"))).context("the film is not made")
 }
 
 fn starts(program: &&str) -> bool {

@@ -130,6 +130,11 @@ impl Source {
         }
     }
 
+    /// True for arrays, which somebody chose one by one; files are left out where others can be read.
+    fn is_arrays(&self) -> bool {
+        matches!(self, Self::Memory(all) if all.iter().all(|one| one.path.is_empty()))
+    }
+
     fn folder(&self) -> &Path {
         folder_of(self.path())
     }
@@ -229,7 +234,7 @@ impl Survey {
         let (found, mut left_out) = readable(looked, &source)?;
         let at = |why: String| RecordingError::at(source.path(), why);
         let (textures, short) = textures(&found).map_err(at)?;
-        if let (Source::Memory(_), Some(why)) = (&source, short.first()) {
+        if let (true, Some(why)) = (source.is_arrays(), short.first()) {
             return Err(at(why.clone()));
         }
         left_out.extend(short);

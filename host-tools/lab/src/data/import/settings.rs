@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use regex::Regex;
 use serde::{Deserialize, Serialize};
 
 use tactus_core::sensor::FingerCode;
@@ -285,15 +284,28 @@ pub(super) const MAX_PATTERN: usize = 256;
 
 /// A pattern of paths such as `{session}/{texture}_*.wav`, of at most [`MAX_PATTERN`] bytes. A star is anything but a
 /// slash; fields and stars are as short as can be.
-pub(super) struct Pattern {
-    like: Regex,
-    /// Names of the fields, in their order.
-    fields: Vec<String>,
+pub(super) struct Pattern(Vec<Part>);
+
+enum Part {
+    Letter(char),
+    Star,
+    Field(String),
+}
+
+impl Part {
+    /// True if what it stands for may have this letter.
+    fn takes(&self, letter: char) -> bool {
+        match self {
+            Self::Letter(own) => *own == letter,
+            Self::Field(name) if is_number(name) => letter.is_ascii_digit() || letter == '.',
+            Self::Star | Self::Field(_) => letter != '/',
+        }
+    }
 }
 
 impl Pattern {
-    pub(super) fn new(pattern: &str) -> Option<Self> {
-        let (mut like, mut fields, mut rest) = (String::from(r"\A"), Vec::new(), pattern);
+    pub(super) fn new(pattern: &str) -> Self {
+        let (mut parts, mut rest) = (Vec::new(), pattern);
         while let Some(letter) = rest.chars().next() {
             let after = &rest[letter.len_utf8()..];
             let field = if letter == '{' {
@@ -302,31 +314,62 @@ impl Pattern {
                 None
             };
             rest = field.map_or(after, |(_, after)| after);
-            match field {
-                Some((name, _)) if !name.is_empty() => {
-                    like += if is_number(name) {
-                        "([0-9.]+?)"
-                    } else {
-                        "([^/]+?)"
-                    };
-                    fields.push(name.to_owned());
-                }
-                None if letter != '*' => like += &regex::escape(letter.encode_utf8(&mut [0; 4])),
-                _ => like += "[^/]*?",
-            }
+            parts.push(match field {
+                Some((name, _)) if !name.is_empty() => Part::Field(name.to_owned()),
+                None if letter != '*' => Part::Letter(letter),
+                _ => Part::Star,
+            });
         }
-        let like = Regex::new(&(like + r"\z")).ok()?;
-        Some(Self { like, fields })
+        Self(parts)
     }
 
     /// The parts of a path; nothing if it is not like this.
     pub(super) fn named(&self, path: &str) -> Option<Named> {
-        let found = self.like.captures(path)?;
-        let mut named = Named::default();
-        for (field, value) in self.fields.iter().zip(found.iter().skip(1)) {
-            named.take(field, value?.as_str())?;
+        let letters: Vec<char> = path.chars().collect();
+        let mut failed = vec![false; (self.0.len() + 1) * (letters.len() + 1)];
+        let ends = self.ends(&letters, 0, 0, &mut failed)?;
+        let (mut named, mut start) = (Named::default(), 0);
+        // the end of the last part was found first
+        for (part, end) in self.0.iter().zip(ends.into_iter().rev()) {
+            if let Part::Field(name) = part {
+                let value: String = letters.get(start..end)?.iter().collect();
+                named.take(name, &value)?;
+            }
+            start = end;
         }
         Some(named).filter(|named| !named.texture.is_empty())
+    }
+
+    /// The ends of the parts from one on, the last one first, where the rest of a path is like these. What has failed
+    /// once is not tried again, so that many stars take no longer than a few.
+    fn ends(
+        &self,
+        letters: &[char],
+        at: usize,
+        start: usize,
+        failed: &mut [bool],
+    ) -> Option<Vec<usize>> {
+        let Some(part) = self.0.get(at) else {
+            return (start == letters.len()).then(Vec::new);
+        };
+        let seen = at * (letters.len() + 1) + start;
+        if failed[seen] {
+            return None;
+        }
+        let takes = letters[start..].iter().take_while(|c| part.takes(**c));
+        let (least, most) = match part {
+            Part::Letter(_) => (1, takes.take(1).count()),
+            Part::Star => (0, takes.count()),
+            Part::Field(_) => (1, takes.count()),
+        };
+        for length in least..=most {
+            if let Some(mut ends) = self.ends(letters, at + 1, start + length, failed) {
+                ends.push(start + length);
+                return Some(ends);
+            }
+        }
+        failed[seen] = true;
+        None
     }
 }
 
@@ -366,7 +409,7 @@ mod tests {
     use super::*;
 
     fn matched(pattern: &str, path: &str) -> Option<Named> {
-        Pattern::new(pattern).unwrap().named(path)
+        Pattern::new(pattern).named(path)
     }
 
     #[test]

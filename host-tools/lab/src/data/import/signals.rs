@@ -12,6 +12,7 @@ use flate2::read::GzDecoder;
 use crate::data::recordings::{RecordingError, Result, read_bounded};
 
 mod arrays;
+#[cfg(feature = "files")]
 mod mcap;
 mod table;
 mod wav;
@@ -137,7 +138,10 @@ impl Signals {
             [b'R', b'I', b'F', b'F', ..] | [b'R', b'F', b'6', b'4', ..] => wav::read(bytes, most),
             [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => arrays::npy(bytes, most),
             [b'P', b'K', 3 | 5, 4 | 6, ..] => arrays::npz(bytes, most),
+            #[cfg(feature = "files")]
             [0x89, b'M', b'C', b'A', b'P', ..] => mcap::read(bytes, most),
+            #[cfg(not(feature = "files"))]
+            [0x89, b'M', ..] => Err("MCAP, which is not read here; use `tactus import`".to_owned()),
             _ => table::read(bytes, most),
         }?;
         for (_, samples) in &read.channels {

@@ -246,7 +246,7 @@ impl Numbers {
 
 /// True for rates that P_AC is read at.
 fn is_read(rate_hz: f64) -> bool {
-    #[cfg(feature = "files")]
+    #[cfg(feature = "import")]
     if crate::data::import::resample::RATES_HZ.contains(&rate_hz) {
         return true;
     }
@@ -255,7 +255,7 @@ fn is_read(rate_hz: f64) -> bool {
 
 /// P_AC at its own rate, from the rate that it was recorded at.
 fn resampled(samples: Vec<i16>, rate_hz: f64) -> Vec<i16> {
-    #[cfg(feature = "files")]
+    #[cfg(feature = "import")]
     if rate_hz != f64::from(PAC_RATE_HZ) {
         use crate::data::import::resample::resample;
         let samples: Vec<f64> = samples.into_iter().map(f64::from).collect();

@@ -191,7 +191,7 @@ impl RecordingWriter {
 
     /// Writes a file beside the slides.
     /// Errors: if it cannot be written.
-    #[cfg(feature = "files")]
+    #[cfg(feature = "import")]
     pub(crate) fn put(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         put(&self.folder, name, bytes, &mut self.made)
     }

@@ -1,8 +1,9 @@
-//! Signals in memory as recordings: an import without files.
+//! Signals and files in memory as recordings: an import without a file system.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::paths::paths_named;
 use super::reading::LEAST;
 use super::{Source, Survey};
 use crate::data::import::resample::RATES_HZ;
@@ -18,6 +19,8 @@ pub(super) const FOLDER: &str = "arrays";
 #[derive(Clone, Debug)]
 pub struct InMemory {
     signals: Signals,
+    /// The path of a file, empty for an array.
+    pub(super) path: String,
     /// Its texture.
     pub texture: String,
     /// Its session and its run; empty if unknown.
@@ -59,6 +62,7 @@ impl InMemory {
                 kind: "array",
                 ..Signals::default()
             },
+            path: String::new(),
             texture: String::new(),
             session: String::new(),
             run: String::new(),
@@ -86,14 +90,43 @@ impl Survey {
         Self::look(Source::Memory(all.into()), &paths, settings, &|_, _| ())
     }
 
+    /// Looks at the bytes of files, each with its path, as [`Survey::of`] does at those below a folder.
+    /// Errors: as there.
+    pub fn of_files(files: Vec<(String, Vec<u8>)>, settings: Settings) -> Result<Self> {
+        settings.check().map_err(RecordingError::said)?;
+        let (mut all, mut left_out) = (Vec::new(), Vec::new());
+        for (path, bytes) in files {
+            match Signals::of(&bytes) {
+                Ok(signals) => all.push(InMemory {
+                    signals,
+                    path,
+                    texture: String::new(),
+                    session: String::new(),
+                    run: String::new(),
+                }),
+                Err(why) => left_out.push(format!("{path}: {why}")),
+            }
+        }
+        let paths = all.iter().map(|one| one.path.clone()).collect();
+        let paths = paths_named(paths, &settings);
+        if let (true, Some(why)) = (paths.is_empty(), left_out.first()) {
+            return Err(RecordingError::said(why.clone()));
+        }
+        let mut survey = Self::look(Source::Memory(all.into()), &paths, settings, &|_, _| ())?;
+        survey.left_out.extend(left_out);
+        Ok(survey)
+    }
+
     /// The slides as recordings in memory, and those that were left out, and why: those of a dead sensor, copies, those
     /// that are too short.
     /// Errors: no slide is left of a texture.
     pub fn recordings(&self) -> Result<(RecordingSet, Vec<String>)> {
         let mut slides: Vec<Vec<_>> = self.textures.iter().map(|_| Vec::new()).collect();
         let mut left_out = match &self.source {
-            Source::Memory(all) => too_short(all, &self.settings).into_values().collect(),
-            Source::Files(_) => Vec::new(),
+            Source::Memory(all) if self.source.is_arrays() => {
+                too_short(all, &self.settings).into_values().collect()
+            }
+            _ => Vec::new(),
         };
         left_out.extend(self.each_slide(&mut |slide, labels| {
             slides[slide.texture].push((slide, labels));
@@ -142,7 +175,9 @@ fn place(path: &str) -> Option<usize> {
 }
 
 pub(super) fn find<'m>(all: &'m Arc<[InMemory]>, path: &str) -> Result<&'m Signals> {
-    let found = place(path).and_then(|at| all.get(at));
-    let found = found.ok_or_else(|| RecordingError::at(path.as_ref(), "there is no such array"));
+    let array = place(path).and_then(|at| all.get(at));
+    let array = array.filter(|one| one.path.is_empty());
+    let found = array.or_else(|| all.iter().find(|one| one.path == path));
+    let found = found.ok_or_else(|| RecordingError::at(path.as_ref(), "there is no such signal"));
     Ok(&found?.signals)
 }

@@ -57,20 +57,7 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<(Paths, Vec<Stri
             None => skipped.push(NOT_TEXT.to_owned()),
         }
     }
-    paths.sort_by_cached_key(|path| natural(path));
-    let pattern = settings.pattern();
-    let like = pattern.and_then(Pattern::new);
-    // without a folder it is one of names
-    let of_names = pattern.is_some_and(|pattern| !pattern.contains('/'));
-    let named = paths.into_iter().filter_map(|path| {
-        let name = path.rsplit('/').next().filter(|_| of_names);
-        let named = match &like {
-            Some(like) => like.named(name.unwrap_or(&path))?,
-            None => guessed(&path),
-        };
-        Some((path, named))
-    });
-    let named: Vec<_> = named.collect();
+    let (named, pattern) = (paths_named(paths, settings), settings.pattern());
     if named.is_empty() {
         let mut why = match pattern {
             Some(pattern) => format!("no path in it is like {pattern:?}"),
@@ -85,6 +72,24 @@ pub(super) fn files(from: &Path, settings: &Settings) -> Result<(Paths, Vec<Stri
         return Err(RecordingError::at(from, why));
     }
     Ok((named, skipped))
+}
+
+/// What these paths say, in their natural order; those that are not like the settings' pattern are left out.
+pub(super) fn paths_named(mut paths: Vec<String>, settings: &Settings) -> Paths {
+    paths.sort_by_cached_key(|path| natural(path));
+    let pattern = settings.pattern();
+    let like = pattern.map(Pattern::new);
+    // without a folder it is one of names
+    let of_names = pattern.is_some_and(|pattern| !pattern.contains('/'));
+    let named = paths.into_iter().filter_map(|path| {
+        let name = path.rsplit('/').next().filter(|_| of_names);
+        let named = match &like {
+            Some(like) => like.named(name.unwrap_or(&path))?,
+            None => guessed(&path),
+        };
+        Some((path, named))
+    });
+    named.collect()
 }
 
 /// The folder of accelerations in the Cluster Haptic Texture Dataset (Eguchi et al., arXiv 2407.16206), as CSV:

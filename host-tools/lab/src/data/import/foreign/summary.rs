@@ -61,7 +61,7 @@ pub(super) fn readable(
     source: &Source,
 ) -> Result<(Vec<Found>, Vec<String>)> {
     let refused = looked.iter().filter(|looked| looked.is_err()).count();
-    let (is_memory, all) = (matches!(source, Source::Memory(_)), looked.len());
+    let (is_memory, all) = (source.is_arrays(), looked.len());
     let (mut found, mut left_out) = (Vec::new(), Vec::new());
     for looked in looked {
         match looked {

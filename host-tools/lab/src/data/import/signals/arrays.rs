@@ -1,9 +1,7 @@
 //! Arrays of numpy: `.npy`, one signal or channels side by side; `.npz`, channels by their names, or a row for each
 //! slide with labels.
 
-use std::io::{Cursor, Read as _};
-
-use super::{MAX_COLUMNS, MAX_PACKED_NUMBERS, MAX_UNPACKED, Piece, Signals, fits, several};
+use super::{Piece, Signals, fits, several};
 use crate::data::recordings::npy::{Array, Elements};
 
 /// Names of a number that is the rate, of the labels of slides, of their sessions and of their runs.
@@ -117,6 +115,31 @@ pub(super) fn npy(file: &[u8], most: usize) -> Result<Signals, String> {
 struct Arrays(Vec<(String, Array)>);
 
 pub(super) fn npz(file: &[u8], most: usize) -> Result<Signals, String> {
+    let arrays = unpacked(file, most)?;
+    if arrays.is_empty() {
+        return Err(
+            "a zip file without an array of numpy; unpack it, and import its folder".to_owned(),
+        );
+    }
+    let arrays = Arrays(arrays);
+    let mut signals = match arrays.slides(most)? {
+        Some(slides) => slides,
+        None => arrays.side_by_side(most)?,
+    };
+    signals.kind = "numpy arrays";
+    signals.rate_hz = arrays.rate();
+    Ok(signals)
+}
+
+#[cfg(not(feature = "files"))]
+fn unpacked(_: &[u8], _: usize) -> Result<Vec<(String, Array)>, String> {
+    Err("a zip file, which is not read here; use `tactus import`".to_owned())
+}
+
+#[cfg(feature = "files")]
+fn unpacked(file: &[u8], most: usize) -> Result<Vec<(String, Array)>, String> {
+    use super::{MAX_COLUMNS, MAX_PACKED_NUMBERS, MAX_UNPACKED};
+    use std::io::{Cursor, Read as _};
     let damaged = |why: &dyn std::fmt::Display| {
         format!("a .npz file that cannot be read ({why}); save it again")
     };
@@ -149,19 +172,7 @@ pub(super) fn npz(file: &[u8], most: usize) -> Result<Signals, String> {
         numbers += array.numbers().map_or(0, <[f64]>::len);
         arrays.push((name, array));
     }
-    if arrays.is_empty() {
-        return Err(
-            "a zip file without an array of numpy; unpack it, and import its folder".to_owned(),
-        );
-    }
-    let arrays = Arrays(arrays);
-    let mut signals = match arrays.slides(most)? {
-        Some(slides) => slides,
-        None => arrays.side_by_side(most)?,
-    };
-    signals.kind = "numpy arrays";
-    signals.rate_hz = arrays.rate();
-    Ok(signals)
+    Ok(arrays)
 }
 
 impl Arrays {
