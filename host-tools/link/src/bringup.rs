@@ -5,6 +5,7 @@
 //! [`MISTAKES`]), where a PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board
 //! ([`Board`]) and asks whoever is there ([`Person`]). It knows the core only.
 
+mod bare;
 mod journal;
 pub mod judge;
 mod line;
@@ -15,9 +16,10 @@ mod seams;
 mod steps;
 pub mod weights;
 
+pub use bare::{BARE, CONNECTORS};
 pub use journal::{Entry, EntryMistake, Journal};
 pub use line::Line;
-pub use mistakes::{MISTAKES, Mistake, Named};
+pub use mistakes::{BARE_MISTAKES, MISTAKES, Mistake, Named};
 pub use mounted::Mounted;
 pub use report::Report;
 pub use seams::{Board, Person, Probe, Trouble};
@@ -53,8 +55,8 @@ pub enum Ended {
 }
 
 /// The image that the next step takes; `None`: all have passed.
-pub fn next_image(journal: &Journal) -> Option<Image> {
-    let mut steps = STEPS.iter();
+pub fn next_image(steps: &[Step], journal: &Journal) -> Option<Image> {
+    let mut steps = steps.iter();
     let next = steps.find(|step| !journal.has_passed(step.key));
     next.map(Step::image)
 }
@@ -62,11 +64,12 @@ pub fn next_image(journal: &Journal) -> Option<Image> {
 /// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that
 /// takes another image.
 pub fn run(
+    steps: &[Step],
     mut ends: Ends<'_>,
     person: &mut dyn Operator,
     journal: &mut Journal,
 ) -> Result<Ended, Trouble> {
-    for step in STEPS {
+    for step in steps {
         if journal.has_passed(step.key) {
             continue;
         }
@@ -95,7 +98,7 @@ pub fn run(
         }
     }
     Ok(
-        match STEPS.iter().all(|step| journal.has_passed(step.key)) {
+        match steps.iter().all(|step| journal.has_passed(step.key)) {
             true => Ended::Passed,
             false => Ended::Failed,
         },

@@ -1,6 +1,7 @@
 //! What measurements of a new rig mean: limits, and which mistake shows like this. Pure functions of what the board and
 //! the person at it said.
 
+pub(crate) mod bare;
 pub mod mounted;
 
 use tactus_core::wire::Reset;

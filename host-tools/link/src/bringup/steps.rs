@@ -65,6 +65,7 @@ macro_rules! ask {
         }
     };
 }
+pub(super) use ask;
 
 /// Weights that somebody has, and what one g is, mN.
 const WEIGHTS_G: [u8; 3] = [50, 100, 150];
@@ -453,7 +454,7 @@ fn ask_stage(
 }
 
 impl Bench<'_> {
-    fn hello(&mut self) -> Result<(tactus_core::wire::Reset, Option<String>), Trouble> {
+    pub(super) fn hello(&mut self) -> Result<(tactus_core::wire::Reset, Option<String>), Trouble> {
         match self.board.ask(Measure::Hello)? {
             Saw::Hello {
                 reset, last_words, ..
