@@ -19,15 +19,17 @@ use tactus_core::wire::bringup::{
 use tactus_core::wire::{MAX_FRAME, Receiver, Text, encode, text};
 
 use self::chip::{chip, hang, rewrite, wait_us};
+use self::hand::Hand;
 use self::motors::{AT_REST, LEVER_STEPS, Motors};
 use self::sensor::{Sensor, Touch};
 use crate::board;
 use crate::checks::{self, Kernels};
-use crate::chip::{flash, rescue};
+use crate::chip::{finger, flash, rescue};
 use crate::tasks::link;
 use crate::tasks::servo::Pins;
 
 mod chip;
+mod hand;
 mod motors;
 mod sensor;
 
@@ -134,6 +136,7 @@ pub async fn selftest() {
         hello,
         pins,
         wires,
+        hand: Hand::new(r.display, r.handle),
         kernels: Kernels::new(),
         touch: Touch::new(Sensor::new(r.sensor, reset).await, 0.0),
         motors: Motors::new(Pins::new(r.lever, r.stage, r.current, r.switches)),
@@ -156,6 +159,7 @@ struct Bench {
     hello: Saw,
     pins: PinsSeen,
     wires: [u8; 4],
+    hand: Hand,
     kernels: Kernels,
     touch: Touch,
     motors: Motors,
@@ -228,6 +232,7 @@ impl Bench {
             }),
             Measure::Converter => Saw::Converter(self.converter().await),
             Measure::Wires => Saw::Wires(self.wires),
+            Measure::Hand => Saw::Hand(self.hand.look().await),
         }
     }
 
@@ -326,7 +331,10 @@ impl Bench {
         let second = second.await;
         let (pac, pdc) = (&second.pac, &second.pdc);
         self.touch.rests_at(pdc.mean());
+        // what a part says of its words tells more than its name
+        let identity = identity.and_then(|who| second.why.map_or(Ok(who), |why| Err(text(why))));
         SensorSeen {
+            finger: finger::code(),
             identity,
             words: second.words,
             garbled: second.garbled,

@@ -130,12 +130,17 @@ impl Sensor {
                     }
                     each(pressure);
                 }
-                Err(why) => match why.kind() {
-                    Some(BadWord::Garbled) => second.garbled += 1,
-                    Some(BadWord::Refused) => second.refused += 1,
-                    Some(BadWord::Silent) => second.silent += 1,
-                    None => {}
-                },
+                Err(why) => {
+                    match why.kind() {
+                        Some(BadWord::Garbled) => second.garbled += 1,
+                        Some(BadWord::Refused) => second.refused += 1,
+                        Some(BadWord::Silent) => second.silent += 1,
+                        None => {}
+                    }
+                    if finger::name() != FingerName::Biotac {
+                        second.why = Some(why);
+                    }
+                }
             }
         }
         second
@@ -150,6 +155,8 @@ pub(super) struct Second {
     pub(super) silent: u32,
     pub(super) late: u32,
     pub(super) last: [u8; 2],
+    /// what a part of another finger than a BioTac said last
+    pub(super) why: Option<FingerError>,
     pub(super) pac: Spread,
     pub(super) pdc: Spread,
 }

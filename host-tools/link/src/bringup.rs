@@ -16,14 +16,13 @@ mod seams;
 mod steps;
 pub mod weights;
 
-pub use bare::{BARE, CONNECTORS};
 pub use journal::{Entry, EntryMistake, Journal};
 pub use line::Line;
-pub use mistakes::{BARE_MISTAKES, MISTAKES, Mistake, Named};
+pub use mistakes::{MISTAKES, Mistake, Named, OTHER_MISTAKES};
 pub use mounted::Mounted;
 pub use report::Report;
 pub use seams::{Board, Person, Probe, Trouble};
-pub use steps::{Bench, Image, STEPS, Step};
+pub use steps::{Bench, Image, Product, STEPS, Step};
 
 use steps::Run;
 
@@ -55,8 +54,8 @@ pub enum Ended {
 }
 
 /// The image that the next step takes; `None`: all have passed.
-pub fn next_image(steps: &[Step], journal: &Journal) -> Option<Image> {
-    let mut steps = steps.iter();
+pub fn next_image(product: Product, journal: &Journal) -> Option<Image> {
+    let mut steps = product.steps().into_iter();
     let next = steps.find(|step| !journal.has_passed(step.key));
     next.map(Step::image)
 }
@@ -64,12 +63,13 @@ pub fn next_image(steps: &[Step], journal: &Journal) -> Option<Image> {
 /// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that
 /// takes another image.
 pub fn run(
-    steps: &[Step],
+    product: Product,
     mut ends: Ends<'_>,
     person: &mut dyn Operator,
     journal: &mut Journal,
 ) -> Result<Ended, Trouble> {
-    for step in steps {
+    let steps = product.steps();
+    for step in &steps {
         if journal.has_passed(step.key) {
             continue;
         }
@@ -77,6 +77,7 @@ pub fn run(
             (Run::SelfTest(run), Ends::SelfTest(board)) => run(&mut Bench {
                 board: &mut **board,
                 person,
+                has_motors: product == Product::Rig,
             })?,
             (Run::Rig(run), Ends::Rig(probe)) => {
                 let weighed = journal.last("scale");

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::event::Reset;
 use super::text::{Text, text};
+use crate::sensor::FingerCode;
 
 /// See above: 16383 as a variant's number.
 pub const MARK: [u8; 2] = [0xFF, 0x7F];
@@ -90,6 +91,8 @@ pub enum Measure {
     Converter,
     /// The pins of the sensor's bus.
     Wires,
+    /// A handheld's button; its display is lit, and its buzzer sounds, for 0.5 s.
+    Hand,
 }
 
 /// Kernels that can be asked for.
@@ -138,6 +141,17 @@ pub enum Saw {
     Converter(ConverterSeen),
     /// Clock, MISO, MOSI and chip select: 16 times the port, A is 0, and the pin.
     Wires([u8; 4]),
+    /// See [`HandSeen`].
+    Hand(HandSeen),
+}
+
+/// A handheld's parts beside the finger.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct HandSeen {
+    /// The display answers.
+    pub display: bool,
+    /// PC13 is high.
+    pub pressed: bool,
 }
 
 /// A check of the chip alone.
@@ -259,13 +273,15 @@ impl PinsSeen {
 /// A second of the sensor.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct SensorSeen {
-    /// Serial number, firmware and flexible circuit, or why they cannot be read.
+    /// The finger that answered when the board started; a BioTac if none did.
+    pub finger: FingerCode,
+    /// Serial number, firmware and flexible circuit, or what is wrong with a part.
     pub identity: Result<Text, Text>,
     /// Words, and those of them that were garbled, error frames, and FF FF or 00 00.
     pub words: u32,
     /// Parity or padding.
     pub garbled: u32,
-    /// Error frames.
+    /// Error frames, or readings that no sound part gives.
     pub error_frames: u32,
     /// FF FF or 00 00.
     pub silent: u32,

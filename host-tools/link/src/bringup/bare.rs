@@ -14,7 +14,7 @@ const TURNS: usize = 150;
 const BY_THE_BOARD: &str = "as the board judges: its limit stands beside each measurement";
 
 /// All of them, in their order.
-pub static BARE: &[Step] = &[
+pub(super) static BARE: &[Step] = &[
     Step {
         key: "link",
         checks: "the line, and the board's seconds by the PC's",
@@ -110,6 +110,52 @@ pub static BARE: &[Step] = &[
     },
 ];
 
+/// Those of a handheld beside its finger.
+pub(super) static HAND: &[Step] = &[
+    Step {
+        key: "display",
+        checks: "the handheld's display",
+        how: "the board lights all of its points, the person looks",
+        limit: || "it answers, and is lit".to_owned(),
+        run: Run::SelfTest(|bench| {
+            let seen = ask!(bench, Measure::Hand, Hand);
+            let lit = bench
+                .person
+                .choose("Is the whole display lit?", &["yes", "no"])?
+                == 0;
+            Ok(judge::display(&seen, lit))
+        }),
+    },
+    Step {
+        key: "button",
+        checks: "the handheld's button",
+        how: "the person presses it",
+        limit: || "PC13 is high while it is pressed".to_owned(),
+        run: Run::SelfTest(|bench| {
+            bench.person.done("Leave the button alone")?;
+            let let_go = ask!(bench, Measure::Hand, Hand);
+            bench.person.done("Press the button and keep it pressed")?;
+            let pressed = ask!(bench, Measure::Hand, Hand);
+            bench.person.done("Let the button go")?;
+            Ok(judge::button(&let_go, &pressed))
+        }),
+    },
+    Step {
+        key: "buzzer",
+        checks: "the handheld's buzzer",
+        how: "the person listens",
+        limit: || "a tone of 2 kHz".to_owned(),
+        run: Run::SelfTest(|bench| {
+            ask!(bench, Measure::Hand, Hand);
+            let heard = bench
+                .person
+                .choose("Did the buzzer sound?", &["yes", "no"])?
+                == 0;
+            Ok(judge::buzzer(heard))
+        }),
+    },
+];
+
 /// Fetches series as long as a frame can be, and compares times.
 fn link(bench: &mut Bench<'_>) -> Result<Finding, Trouble> {
     bench.hello()?;
@@ -146,7 +192,7 @@ fn wiring(pins: [u8; 4]) -> String {
 }
 
 /// Names of pins at the connectors (UM1974, and the rig's page).
-pub const CONNECTORS: [(&str, &str); 4] = [
+const CONNECTORS: [(&str, &str); 4] = [
     ("PA5", "D13"),
     ("PA6", "D12"),
     ("PB5", "D22"),

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::journal::{Entry, Journal};
-use super::steps::Step;
+use super::steps::Product;
 use crate::whole::write_whole;
 
 /// The knowledge of a rig.
@@ -31,7 +31,8 @@ struct ReportStep {
 
 impl Report {
     /// That of a journal.
-    pub fn new(steps: &[Step], journal: &Journal) -> Self {
+    pub fn new(product: Product, journal: &Journal) -> Self {
+        let steps = product.steps();
         let passed = steps.iter().all(|step| journal.has_passed(step.key));
         let steps = steps.iter().map(|step| ReportStep {
             step: step.key,

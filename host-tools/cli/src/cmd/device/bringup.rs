@@ -10,8 +10,8 @@ use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_link::Request;
 use tactus_link::bringup::{
-    self, BARE, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report,
-    STEPS, Step, Trouble, judge,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Product,
+    Report, Step, Trouble, judge,
 };
 
 use super::bench::{Bench, BenchError, Interrupt};
@@ -42,6 +42,12 @@ pub(crate) struct Args {
     /// Check a board without a rig: clocks, kernels, timers, flash, link, and a converter on a breadboard
     #[arg(long)]
     bare: bool,
+    /// Check a handheld: display, button, buzzer and finger
+    #[arg(long, conflicts_with = "bare")]
+    handheld: bool,
+    /// Check a probe on an arm or a printer: its finger
+    #[arg(long, conflicts_with_all = ["bare", "handheld"])]
+    arm: bool,
 }
 
 /// A board that starts answers within this.
@@ -69,11 +75,16 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         interrupt: interrupt.clone(),
         lines: lines(),
     };
-    let steps = if how.bare { BARE } else { STEPS };
-    let done = if bringup::next_image(steps, &journal) == Some(Image::Rig) {
+    let product = match how {
+        Args { bare: true, .. } => Product::Bare,
+        Args { handheld: true, .. } => Product::Handheld,
+        Args { arm: true, .. } => Product::Arm,
+        _ => Product::Rig,
+    };
+    let done = if bringup::next_image(product, &journal) == Some(Image::Rig) {
         let (bench, _) = Bench::open(&place, Format::Text)?;
         let mut linked = Linked(bench);
-        bringup::run(steps, Ends::Rig(&mut linked), &mut person, &mut journal)
+        bringup::run(product, Ends::Rig(&mut linked), &mut person, &mut journal)
     } else {
         let open = place.open().map_err(BenchError::from)?;
         let mut board = Serial {
@@ -90,11 +101,11 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
             .and_then(|reset| reset.ok_or(Trouble::Silent))
             .and_then(|_| {
                 let ends = Ends::SelfTest(&mut board);
-                bringup::run(steps, ends, &mut person, &mut journal)
+                bringup::run(product, ends, &mut person, &mut journal)
             })
     };
     made.keep();
-    let report = Report::new(steps, &journal);
+    let report = Report::new(product, &journal);
     report.write(&how.report)?;
     write!(out, "{}", report.text())?;
     out.flush()?;
@@ -106,6 +117,9 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Ended::Passed if how.bare => {
             say("All steps have passed: the board is sound. Please send the report");
         }
+        Ended::Passed if product != Product::Rig => say(
+            "All steps have passed. Next: flash its own image (cargo xtask flash --help), then tactus device calibrate",
+        ),
         Ended::Passed => {
             say("All steps have passed. Next: tactus device identify, or tactus device train");
         }

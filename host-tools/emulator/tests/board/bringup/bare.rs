@@ -1,13 +1,11 @@
 //! A bare board's evening, and what may be wrong with it.
 
-use tactus_link::bringup::BARE;
-
 use super::*;
 
 /// A board as it is delivered, and an MCP3202 on a breadboard.
 fn bare() -> Built {
     Built {
-        steps: BARE,
+        product: Product::Bare,
         finger: FingerName::Analog,
         brown_out: 3,
         ..Built::default()

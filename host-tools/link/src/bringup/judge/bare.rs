@@ -1,7 +1,8 @@
-//! A bare board's measurements: the line, the chip by itself, and a converter with a potentiometer.
+//! Measurements of bare boards and handhelds: the line, the chip by itself, a converter with a potentiometer, display,
+//! button, buzzer.
 
 use tactus_core::wire::Reset;
-use tactus_core::wire::bringup::{Checked, ChipSeen, ConverterSeen};
+use tactus_core::wire::bringup::{Checked, ChipSeen, ConverterSeen, HandSeen};
 
 use super::{Finding, chip, m};
 
@@ -90,4 +91,36 @@ pub(crate) fn turned(all: &[ConverterSeen]) -> Finding {
         .wrong(!silent && down && !up, &m::POTENTIOMETER, "not to 3V3")
         .wrong(!silent && up && !down, &m::POTENTIOMETER, "not to GND")
         .wrong(!silent && !up && !down, &m::POTENTIOMETER, "to neither end")
+}
+
+/// A handheld's display, which a person sees.
+pub(crate) fn display(seen: &HandSeen, lit: bool) -> Finding {
+    let (answers, lit_) = (seen.display, if lit { "lit" } else { "dark" });
+    let answer = if answers {
+        "answers"
+    } else {
+        "does not answer"
+    };
+    Finding::new(format!("it {answer}, and is {lit_}"))
+        .wrong(!answers, &m::DISPLAY_SILENT, "")
+        .wrong(answers && !lit, &m::DISPLAY_DARK, "")
+}
+
+/// A handheld's button, let go and pressed.
+pub(crate) fn button(let_go: &HandSeen, pressed: &HandSeen) -> Finding {
+    let level = |seen: &HandSeen| if seen.pressed { "high" } else { "low" };
+    let saw = format!(
+        "PC13 is {} let go, {} pressed",
+        level(let_go),
+        level(pressed)
+    );
+    Finding::new(saw)
+        .wrong(let_go.pressed, &m::BUTTON_STUCK, "")
+        .wrong(!pressed.pressed, &m::BUTTON_DEAD, "")
+}
+
+/// A handheld's buzzer, by a person's ear.
+pub(crate) fn buzzer(heard: bool) -> Finding {
+    let saw = if heard { "heard" } else { "not heard" };
+    Finding::new(saw.to_owned()).wrong(!heard, &m::BUZZER, "")
 }

@@ -6,8 +6,9 @@ use std::panic::Location;
 
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::unloaded::SPEEDS_UM_S;
+use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::Calibration;
-use tactus_core::wire::bringup::{Checked, ConverterSeen};
+use tactus_core::wire::bringup::{Checked, ConverterSeen, HandSeen};
 use tactus_core::wire::{Live, SlideReport};
 
 use super::mounted::SlideSeen;
@@ -68,6 +69,7 @@ fn pins_but(others: &[(Pin, Tied)]) -> Finding {
 fn sensor_second() -> SensorSeen {
     let text = |words: &str| words.try_into().unwrap();
     SensorSeen {
+        finger: FingerCode::BIOTAC,
         identity: Ok(text("BT-1")),
         words: 4400,
         garbled: 0,
@@ -319,6 +321,18 @@ fn turns(undriven: u16, low: u16, high: u16) -> Finding {
     bare::turned(&[first, readings(undriven, [[high - 9, high], [4095; 2]])])
 }
 
+fn of_parts(finger: FingerName, why: &str, error_frames: u32) -> Finding {
+    sensor_but(|seen| {
+        seen.finger = FingerCode::of(finger);
+        seen.identity = Err(why.try_into().unwrap());
+        seen.error_frames = error_frames;
+    })
+}
+
+fn hand(display: bool, pressed: bool) -> HandSeen {
+    HandSeen { display, pressed }
+}
+
 macro_rules! cases {
     ($($name:literal: $found:expr => $($key:literal $place:literal),*;)*) => {
         const CASES: &[Case] = &[$(($name, || $found, &[$(($key, $place)),*])),*];
@@ -502,6 +516,20 @@ cases! {
     "no traction": slid_with(|slide| slide.properties[0] = None) => "slide-traction" "";
     "traction that pushes": slid_with(|slide| slide.properties[0] = Some(-0.1)) => "slide-traction" "";
     "no slide": slid(|seen| seen.observed = None) => "fault" "";
+    "a sound finger's pins": finger_pins(&PinsSeen { up: u16::MAX, down: u16::MAX }) => ;
+    "a cut wire of the cell": of_parts(FingerName::Analog, "check its four wires", 2200) => "cell" "";
+    "a part that is off": of_parts(FingerName::Mems, "the IIS3DWB is off", 2200) => "part" "";
+    "a few damaged words": of_parts(FingerName::Mems, "the IIS3DWB is off", 220) => "words" "";
+    "a still analog finger": noise(&SensorSeen { finger: FingerCode::of(FingerName::Analog), pac: [0.0, 0.5],
+        pdc: [1000.0, 0.5], ..sensor_second() }) => ;
+    "a display": bare::display(&hand(true, false), true) => ;
+    "a display that is not there": bare::display(&hand(false, false), false) => "display-silent" "";
+    "a dark display": bare::display(&hand(true, false), false) => "display-dark" "";
+    "a button": bare::button(&hand(true, false), &hand(true, true)) => ;
+    "a stuck button": bare::button(&hand(true, true), &hand(true, true)) => "button-stuck" "";
+    "a dead button": bare::button(&hand(true, false), &hand(true, false)) => "button-dead" "";
+    "a buzzer": bare::buzzer(true) => ;
+    "no buzzer": bare::buzzer(false) => "buzzer" "";
     "a sound line": lines(100, 0, 1002) => ;
     "a lost answer": lines(99, 0, 1000) => "link" "";
     "a damaged frame": lines(100, 1, 1000) => "link" "";
