@@ -184,9 +184,9 @@ pub static STEPS: &[Step] = &[
             let limits = FingerName::ALL.map(|finger| {
                 let at_rest = finger.parts().model.at_rest;
                 let ((still, noisy), (low, high)) = (at_rest.pac_noise_counts, at_rest.pdc_counts);
-                format!("`{finger}` P_AC {still} to {noisy} counts rms, P_DC {low} to {high}")
+                format!("`{finger}` {still} to {noisy}, {low} to {high}")
             });
-            limits.join("; ")
+            format!("counts of P_AC (rms) and P_DC: {}", limits.join("; "))
         },
         run: Run::SelfTest(|bench| {
             bench
