@@ -6,16 +6,15 @@ use core::ptr::{addr_of, addr_of_mut, read_volatile, write_volatile};
 use core::sync::atomic::AtomicU32;
 use core::sync::atomic::Ordering::Relaxed;
 
-use cortex_m::peripheral::DWT;
 use static_cell::StaticCell;
 use tactus_core::dsp::Plan;
 
-use self::workload::{Counter, Workload, run};
 use crate::board;
+use crate::checks::Cycles;
 use crate::chip::{KERNELS, rescue};
+use crate::workload::{Workload, run};
 
 mod silicon;
-pub mod workload;
 
 pub use silicon::silicon;
 
@@ -57,23 +56,6 @@ static BENCH_DESK: Shared = Shared(UnsafeCell::new(Desk {
 /// The sectors of bank 2 behind the store, which the rig leaves alone: a table of any size.
 const TABLE_AT: usize = 0x0812_0000;
 const TABLE_ROOM: usize = 0x000E_0000;
-
-/// Not 0 while something is counted: the emulator's bench looks then what is running.
-#[unsafe(no_mangle)]
-static BENCH_COUNTS: AtomicU32 = AtomicU32::new(0);
-
-struct Cycles(u32);
-
-impl Counter for Cycles {
-    fn count<T>(&mut self, work: impl FnOnce() -> T) -> T {
-        BENCH_COUNTS.store(1, Relaxed);
-        let begin = DWT::cycle_count();
-        let done = work();
-        self.0 = DWT::cycle_count().wrapping_sub(begin);
-        BENCH_COUNTS.store(0, Relaxed);
-        done
-    }
-}
 
 const WANTED: u32 = 0x7ac7_be7c;
 

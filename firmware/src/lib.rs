@@ -8,14 +8,16 @@ mod arm;
 mod bench;
 mod board;
 mod boot;
+mod checks;
 mod chip;
 mod handheld;
 mod rig;
 mod selftest;
 mod tasks;
+pub mod workload;
 
 pub use arm::arm;
-pub use bench::{silicon, workload};
+pub use bench::silicon;
 pub use handheld::handheld;
 pub use rig::rig;
 pub use selftest::selftest;

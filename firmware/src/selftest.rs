@@ -5,28 +5,31 @@ use core::future::Future;
 use core::sync::atomic::Ordering::Relaxed;
 
 use embassy_futures::select::{Either, select};
-use embassy_stm32::gpio::{Flex, Pull, Speed};
+use embassy_stm32::gpio::{Flex, Pin as _, Pull, Speed};
 use embassy_stm32::usart::{BufferedUartRx, BufferedUartTx};
-use embassy_time::{Duration, Instant, with_timeout};
+use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read as _, Write as _};
 use heapless::Vec;
 use tactus_core::sensor::pressure::Channel;
 use tactus_core::store::StoreError;
 use tactus_core::wire::bringup::{
-    Answer, Ask, BRINGUP, LeverSeen, Look, MARK, Measure, POINTS, PinsSeen, Saw, SensorSeen,
-    StageSeen, Stopped,
+    Answer, Ask, BRINGUP, Checked, ConverterSeen, LeverSeen, Look, MARK, Measure, POINTS, PinsSeen,
+    READINGS, Saw, SensorSeen, StageSeen, Stopped,
 };
 use tactus_core::wire::{MAX_FRAME, Receiver, Text, encode, text};
 
 use self::chip::{chip, hang, rewrite, wait_us};
+use self::hand::Hand;
 use self::motors::{AT_REST, LEVER_STEPS, Motors};
 use self::sensor::{Sensor, Touch};
 use crate::board;
-use crate::chip::{flash, rescue};
+use crate::checks::{self, Kernels};
+use crate::chip::{finger, flash, rescue};
 use crate::tasks::link;
 use crate::tasks::servo::Pins;
 
 mod chip;
+mod hand;
 mod motors;
 mod sensor;
 
@@ -34,6 +37,8 @@ mod sensor;
 const LOOK: Duration = Duration::from_millis(20);
 /// The pull of a pin needs this long to charge a metre of cable, us: 40 kohm and 1 nF, five times over.
 const SETTLES_US: u32 = 200;
+/// From one reading of a converter's channels to the next, us.
+const CONVERTS_US: u64 = 400;
 /// 1 mm/s: slow enough that the eye sees which way it goes.
 const LEVER_STEPS_S: i32 = 1600;
 
@@ -118,10 +123,21 @@ pub async fn selftest() {
         last_words,
     };
     line.answer(hello.clone()).await;
+    let bus = &r.sensor;
+    let wires = [
+        (bus.sck.port(), bus.sck.pin()),
+        (bus.miso.port(), bus.miso.pin()),
+        (bus.mosi.port(), bus.mosi.pin()),
+        (bus.select.port(), bus.select.pin()),
+    ]
+    .map(|(port, pin)| port << 4 | pin);
     let pins = pins(&mut r.sensor, &mut r.lever, &mut r.stage, &mut r.switches);
     let mut bench = Bench {
         hello,
         pins,
+        wires,
+        hand: Hand::new(r.display, r.handle),
+        kernels: Kernels::new(),
         touch: Touch::new(Sensor::new(r.sensor, reset).await, 0.0),
         motors: Motors::new(Pins::new(r.lever, r.stage, r.current, r.switches)),
         squeezed: false,
@@ -142,6 +158,9 @@ pub async fn selftest() {
 struct Bench {
     hello: Saw,
     pins: PinsSeen,
+    wires: [u8; 4],
+    hand: Hand,
+    kernels: Kernels,
     touch: Touch,
     motors: Motors,
     /// Somebody has squeezed the finger: motors may move.
@@ -201,6 +220,19 @@ impl Bench {
                 let points = points.get(..POINTS).unwrap_or(points);
                 Saw::Series(Vec::from_slice(points).unwrap_or_default())
             }
+            Measure::Kernel(number) => Saw::Checks(self.kernels.check(number)),
+            Measure::Timers => Saw::Checks(checks::timers(&mut self.motors.pins.current)),
+            Measure::Flash => Saw::Checks(match &mut self.storage {
+                Some(storage) => checks::flash(storage).await,
+                None => Vec::from([Checked::new(
+                    "flash",
+                    false,
+                    "the store has it: start again",
+                )]),
+            }),
+            Measure::Converter => Saw::Converter(self.converter().await),
+            Measure::Wires => Saw::Wires(self.wires),
+            Measure::Hand => Saw::Hand(self.hand.look().await),
         }
     }
 
@@ -299,7 +331,10 @@ impl Bench {
         let second = second.await;
         let (pac, pdc) = (&second.pac, &second.pdc);
         self.touch.rests_at(pdc.mean());
+        // what a part says of its words tells more than its name
+        let identity = identity.and_then(|who| second.why.map_or(Ok(who), |why| Err(text(why))));
         SensorSeen {
+            finger: finger::code(),
             identity,
             words: second.words,
             garbled: second.garbled,
@@ -309,6 +344,29 @@ impl Bench {
             last: second.last,
             pac: [pac.mean(), pac.rms()],
             pdc: [pdc.mean(), pdc.rms()],
+        }
+    }
+
+    async fn converter(&mut self) -> ConverterSeen {
+        let (mut undriven, mut counts) = (0, [[u16::MAX, 0]; 2]);
+        for _ in 0..READINGS {
+            Timer::after_micros(CONVERTS_US).await;
+            let both = self.touch.sensor.conversions();
+            for (read, [least, most]) in both.iter().zip(&mut counts) {
+                let read = read.unwrap_or_else(|| {
+                    undriven += 1;
+                    u16::MAX
+                });
+                (*least, *most) = (read.min(*least), read.max(*most));
+            }
+            let point = both.map(|read| read.map_or(-1, |counts| counts as i16));
+            let _ = self.motors.series.push(point);
+        }
+        self.touch.sensor.speed_up();
+        ConverterSeen {
+            read: 2 * READINGS,
+            undriven,
+            counts,
         }
     }
 

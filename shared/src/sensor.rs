@@ -11,7 +11,7 @@ mod find;
 mod finger;
 mod finger_code;
 mod iis3dwb;
-mod mcp3202;
+pub mod mcp3202;
 pub mod mems;
 pub mod paa5100je;
 pub mod pressure;

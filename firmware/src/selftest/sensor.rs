@@ -2,9 +2,9 @@
 //! it.
 use embassy_time::{Duration, Instant, Timer};
 use tactus_core::sensor::biotac::{IdentityBytes, keep};
-use tactus_core::sensor::pressure::{Channel, Pressure, SLOTS_HZ};
+use tactus_core::sensor::pressure::{Channel, Counts, Pressure, SLOTS_HZ};
 use tactus_core::sensor::slot::{self, Answer, Transaction, Unexpected};
-use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerName};
+use tactus_core::sensor::{AnyFinger, BadWord, FingerError, FingerName, FingerParts, mcp3202};
 use tactus_core::wire::bringup::{Stopped, limits};
 use tactus_core::wire::{Reset, Text, text};
 
@@ -41,20 +41,36 @@ impl Sensor {
         let mut bus = Bus::new(pins);
         let found = finger::find_at_boot(&mut bus, reset).await;
         let started = finger::start(&mut bus);
-        bus.speed_up(finger::parts());
-        Self {
+        let mut sensor = Self {
             found,
             started,
             bus,
             finger: AnyFinger::new(finger::name()),
-        }
+        };
+        sensor.speed_up();
+        sensor
+    }
+
+    /// Has the bus as fast as the finger's parts can be read.
+    pub(super) fn speed_up(&mut self) {
+        self.bus.speed_up(finger::parts());
+    }
+
+    /// Both channels of an MCP3202 in the finger's place, counts; `None` is one that nobody drives. The bus is as fast
+    /// as that afterwards.
+    pub(super) fn conversions(&mut self) -> [Option<u16>; 2] {
+        let parts = FingerName::Analog.parts();
+        self.bus.speed_up(parts);
+        [0, 1].map(|slot| {
+            let answer = self.perform(parts, parts.slot(slot));
+            mcp3202::decode(&answer).map(Counts::get)
+        })
     }
 
     /// The answer to transactions; nothing if the bus is off.
-    fn perform(&mut self, transactions: &[Transaction]) -> Answer {
-        let ports = finger::parts().ports;
+    fn perform(&mut self, parts: &FingerParts, transactions: &[Transaction]) -> Answer {
         let answer = slot::perform(transactions, |transaction, bytes| {
-            let port = ports.get(usize::from(transaction.port));
+            let port = parts.ports.get(usize::from(transaction.port));
             let done = self.bus.transact(port, transaction, bytes);
             wait_us(transaction.gap_us);
             done
@@ -74,7 +90,7 @@ impl Sensor {
         }
         let mut bytes = IdentityBytes::default();
         for (transactions, place) in bytes.reads() {
-            keep(place, &self.perform(&transactions));
+            keep(place, &self.perform(finger::parts(), &transactions));
         }
         let id = bytes.decode().map_err(text)?;
         Ok(text(format_args!(
@@ -84,7 +100,8 @@ impl Sensor {
     }
 
     fn word(&mut self, slot: u32) -> (Result<Pressure, FingerError>, Answer) {
-        let answer = self.perform(finger::parts().slot(slot));
+        let parts = finger::parts();
+        let answer = self.perform(parts, parts.slot(slot));
         (self.finger.decode(slot, &answer), answer)
     }
 
@@ -113,12 +130,17 @@ impl Sensor {
                     }
                     each(pressure);
                 }
-                Err(why) => match why.kind() {
-                    Some(BadWord::Garbled) => second.garbled += 1,
-                    Some(BadWord::Refused) => second.refused += 1,
-                    Some(BadWord::Silent) => second.silent += 1,
-                    None => {}
-                },
+                Err(why) => {
+                    match why.kind() {
+                        Some(BadWord::Garbled) => second.garbled += 1,
+                        Some(BadWord::Refused) => second.refused += 1,
+                        Some(BadWord::Silent) => second.silent += 1,
+                        None => {}
+                    }
+                    if finger::name() != FingerName::Biotac {
+                        second.why = Some(why);
+                    }
+                }
             }
         }
         second
@@ -133,6 +155,8 @@ pub(super) struct Second {
     pub(super) silent: u32,
     pub(super) late: u32,
     pub(super) last: [u8; 2],
+    /// what a part of another finger than a BioTac said last
+    pub(super) why: Option<FingerError>,
     pub(super) pac: Spread,
     pub(super) pdc: Spread,
 }

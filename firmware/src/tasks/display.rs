@@ -59,6 +59,8 @@ const INIT: [u8; 26] = [
     0xA4, 0xA6, 0x2E, // what is in its memory, lit where it is 1, standing
 ];
 const ON: [u8; 2] = [COMMANDS, 0xAF];
+/// All points, whatever is in its memory.
+const LIT: [u8; 3] = [COMMANDS, 0xA5, 0xAF];
 const OFF: [u8; 2] = [COMMANDS, 0xAE];
 /// The next points are those of a whole picture.
 const AREA: [u8; 7] = [
@@ -117,10 +119,29 @@ impl Sent {
     }
 }
 
-#[embassy_executor::task]
-pub(crate) async fn show(mut pins: board::Display) {
+fn bus(pins: &mut board::Display) -> Bus<'_> {
     let mut config = i2c::Config::default();
     config.frequency = Hertz(400_000);
+    I2c::new(
+        pins.i2c.reborrow(),
+        pins.scl.reborrow(),
+        pins.sda.reborrow(),
+        pins.tx.reborrow(),
+        pins.rx.reborrow(),
+        Irqs,
+        config,
+    )
+}
+
+/// Lights all points of the display: whether it answers.
+pub(crate) async fn light(pins: &mut board::Display) -> bool {
+    free(pins).await;
+    let mut bus = bus(pins);
+    write(&mut bus, &INIT).await.is_ok() && write(&mut bus, &LIT).await.is_ok()
+}
+
+#[embassy_executor::task]
+pub(crate) async fn show(mut pins: board::Display) {
     let mut sent = Sent {
         bytes: [0; 1 + WIDTH * HEIGHT / 8],
         any: false,
@@ -131,15 +152,7 @@ pub(crate) async fn show(mut pins: board::Display) {
     loop {
         free(&mut pins).await;
         // made anew: one that hangs does not go on by itself
-        let mut bus = I2c::new(
-            pins.i2c.reborrow(),
-            pins.scl.reborrow(),
-            pins.sda.reborrow(),
-            pins.tx.reborrow(),
-            pins.rx.reborrow(),
-            Irqs,
-            config,
-        );
+        let mut bus = bus(&mut pins);
         // its power may come late, or its plug be loose
         if run(&mut bus, &mut sent).await.is_err() {
             defmt::warn!("no display: it does not answer");

@@ -5,6 +5,7 @@
 //! [`MISTAKES`]), where a PC tests them. [`run`] goes through [`STEPS`] over whatever carries bytes to the board
 //! ([`Board`]) and asks whoever is there ([`Person`]). It knows the core only.
 
+mod bare;
 mod journal;
 pub mod judge;
 mod line;
@@ -17,11 +18,11 @@ pub mod weights;
 
 pub use journal::{Entry, EntryMistake, Journal};
 pub use line::Line;
-pub use mistakes::{MISTAKES, Mistake, Named};
+pub use mistakes::{MISTAKES, Mistake, Named, OTHER_MISTAKES};
 pub use mounted::Mounted;
 pub use report::Report;
 pub use seams::{Board, Person, Probe, Trouble};
-pub use steps::{Bench, Image, STEPS, Step};
+pub use steps::{Bench, Image, Product, STEPS, Step};
 
 use steps::Run;
 
@@ -53,8 +54,8 @@ pub enum Ended {
 }
 
 /// The image that the next step takes; `None`: all have passed.
-pub fn next_image(journal: &Journal) -> Option<Image> {
-    let mut steps = STEPS.iter();
+pub fn next_image(product: Product, journal: &Journal) -> Option<Image> {
+    let mut steps = product.steps().into_iter();
     let next = steps.find(|step| !journal.has_passed(step.key));
     next.map(Step::image)
 }
@@ -62,11 +63,13 @@ pub fn next_image(journal: &Journal) -> Option<Image> {
 /// Goes through the steps that have not passed yet, up to the first one that fails unless the person goes on, or that
 /// takes another image.
 pub fn run(
+    product: Product,
     mut ends: Ends<'_>,
     person: &mut dyn Operator,
     journal: &mut Journal,
 ) -> Result<Ended, Trouble> {
-    for step in STEPS {
+    let steps = product.steps();
+    for step in &steps {
         if journal.has_passed(step.key) {
             continue;
         }
@@ -74,6 +77,7 @@ pub fn run(
             (Run::SelfTest(run), Ends::SelfTest(board)) => run(&mut Bench {
                 board: &mut **board,
                 person,
+                has_motors: product == Product::Rig,
             })?,
             (Run::Rig(run), Ends::Rig(probe)) => {
                 let weighed = journal.last("scale");
@@ -95,7 +99,7 @@ pub fn run(
         }
     }
     Ok(
-        match STEPS.iter().all(|step| journal.has_passed(step.key)) {
+        match steps.iter().all(|step| journal.has_passed(step.key)) {
             true => Ended::Passed,
             false => Ended::Failed,
         },

@@ -99,7 +99,12 @@ impl Peers {
                 FLOATING
             }
             Self::Analog(converter) => {
-                converter.byte(mosi, |channel| finger.sample_channel(channel, fraction))
+                let inputs = converter.inputs;
+                converter.byte(mosi, |channel| match inputs {
+                    Some([first, _]) if channel == 0 => first,
+                    Some([_, second]) => second,
+                    None => finger.sample_channel(channel, fraction),
+                })
             }
             Self::Mems(parts) => match parts.selected {
                 _ if parts.unplugged => FLOATING,

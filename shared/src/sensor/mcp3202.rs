@@ -27,7 +27,7 @@ pub(super) const CONVERSIONS: [Transaction; 2] = [
 /// The reading in an answer; `None` if the converter does not drive the line, or the answer did not come. Three bits
 /// are not driven; then a null bit and 12 bits, the most significant first. A line that is pulled low reads as 0
 /// counts.
-pub(super) fn decode(answer: &[u8]) -> Option<Counts> {
+pub fn decode(answer: &[u8]) -> Option<Counts> {
     match *answer {
         [upper, lower] if upper & 0b1_0000 == 0 => {
             Some(Counts::from_low_bits(u16::from_be_bytes([upper, lower])))

@@ -7,11 +7,14 @@
 
 pub mod limits;
 
+use core::fmt;
+
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 use super::event::Reset;
-use super::text::Text;
+use super::text::{Text, text};
+use crate::sensor::FingerCode;
 
 /// See above: 16383 as a variant's number.
 pub const MARK: [u8; 2] = [0xFF, 0x7F];
@@ -78,7 +81,24 @@ pub enum Measure {
     Restart,
     /// The points from this one on of the last series.
     Series(u16),
+    /// A kernel in assembly, by its number up to [`KERNELS`]: its results are those of its plain twin, its cycles.
+    Kernel(u8),
+    /// The timer of the slots, and the ring of the motor's current.
+    Timers,
+    /// A write to a sector that nobody uses, and its erase.
+    Flash,
+    /// An MCP3202 in the sensor's place for [`READINGS`]; a series of both its channels, counts.
+    Converter,
+    /// The pins of the sensor's bus.
+    Wires,
+    /// A handheld's button; its display is lit, and its buzzer sounds, for 0.5 s.
+    Hand,
 }
+
+/// Kernels that can be asked for.
+pub const KERNELS: u8 = 3;
+/// Readings of each channel of a converter.
+pub const READINGS: u16 = 240;
 
 /// What was seen.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -115,6 +135,56 @@ pub enum Saw {
     Store(Result<[u32; 2], Text>),
     /// Points of the last series.
     Series(Vec<[i16; 2], POINTS>),
+    /// See [`Checked`].
+    Checks(Vec<Checked, 2>),
+    /// See [`ConverterSeen`].
+    Converter(ConverterSeen),
+    /// Clock, MISO, MOSI and chip select: 16 times the port, A is 0, and the pin.
+    Wires([u8; 4]),
+    /// See [`HandSeen`].
+    Hand(HandSeen),
+}
+
+/// A handheld's parts beside the finger.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct HandSeen {
+    /// The display answers.
+    pub display: bool,
+    /// PC13 is high.
+    pub pressed: bool,
+}
+
+/// A check of the chip alone.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Checked {
+    /// Its name.
+    pub name: String<16>,
+    /// True if it has passed.
+    pub good: bool,
+    /// The measurement, with its limit.
+    pub measured: Text,
+}
+
+impl Checked {
+    /// Cuts off what is too long.
+    pub fn new(name: &str, good: bool, measured: impl fmt::Display) -> Self {
+        Self {
+            name: name.try_into().unwrap_or_default(),
+            good,
+            measured: text(measured),
+        }
+    }
+}
+
+/// Readings of a converter of two channels.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct ConverterSeen {
+    /// Readings of both channels, and those of them that the converter did not drive: they have no null bit.
+    pub read: u16,
+    /// See [`ConverterSeen::read`].
+    pub undriven: u16,
+    /// Least and most of each channel, counts.
+    pub counts: [[u16; 2]; 2],
 }
 
 /// Clocks and option bytes.
@@ -203,13 +273,15 @@ impl PinsSeen {
 /// A second of the sensor.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct SensorSeen {
-    /// Serial number, firmware and flexible circuit, or why they cannot be read.
+    /// The finger that answered when the board started; a BioTac if none did.
+    pub finger: FingerCode,
+    /// Serial number, firmware and flexible circuit, or what is wrong with a part.
     pub identity: Result<Text, Text>,
     /// Words, and those of them that were garbled, error frames, and FF FF or 00 00.
     pub words: u32,
     /// Parity or padding.
     pub garbled: u32,
-    /// Error frames.
+    /// Error frames, or readings that no sound part gives.
     pub error_frames: u32,
     /// FF FF or 00 00.
     pub silent: u32,
@@ -363,6 +435,24 @@ mod tests {
             id: u16::MAX,
             at_ms: u32::MAX,
             mark: MARK,
+            saw,
+        };
+        assert_eq!(decode::<Answer>(&mut frame(&answer)), Ok(answer));
+    }
+
+    #[test]
+    fn the_longest_checks_fit_into_a_frame() {
+        let [name, measured] = ["n", "m"].map(|letter| letter.repeat(200));
+        let checked = Checked {
+            name: name[..16].try_into().unwrap(),
+            ..Checked::new("", true, &measured)
+        };
+        let saw = Saw::Checks(Vec::from_slice(&[checked.clone(), checked]).unwrap());
+        let (id, at_ms, mark) = (u16::MAX, u32::MAX, MARK);
+        let answer = Answer {
+            id,
+            at_ms,
+            mark,
             saw,
         };
         assert_eq!(decode::<Answer>(&mut frame(&answer)), Ok(answer));

@@ -38,6 +38,8 @@ pub struct Display {
     command: Vec<u8>,
     ram: [u8; WIDTH * HEIGHT / 8],
     on: bool,
+    /// all points are lit, whatever is in the memory
+    lit: bool,
     pump: bool,
     inverted: bool,
     /// turned by half a turn in each direction
@@ -63,6 +65,7 @@ impl Default for Display {
             command: Vec::new(),
             ram: [0; WIDTH * HEIGHT / 8],
             on: false,
+            lit: false,
             pump: false,
             inverted: false,
             remapped: (false, false),
@@ -89,7 +92,7 @@ impl Display {
             for x in 0..WIDTH {
                 let column = if self.remapped.0 { x } else { WIDTH - 1 - x };
                 let row = if self.remapped.1 { y } else { HEIGHT - 1 - y };
-                let lit = self.ram[row / 8 * WIDTH + column] >> (row % 8) & 1 == 1;
+                let lit = self.lit || self.ram[row / 8 * WIDTH + column] >> (row % 8) & 1 == 1;
                 seen[y / 8 * WIDTH + x] |= u8::from(lit != self.inverted) << (y % 8);
             }
         }
@@ -220,6 +223,7 @@ impl Display {
             [0xC0] => self.remapped.1 = false,
             [0xC8] => self.remapped.1 = true,
             [inverted @ 0xA6..=0xA7] => self.inverted = inverted & 1 == 1,
+            [lit @ 0xA4..=0xA5] => self.lit = lit & 1 == 1,
             [on @ 0xAE..=0xAF] => self.on = on & 1 == 1,
             // contrast, multiplex, offset, clock, precharge, COM pins, VCOMH, start line 0, RAM shown, no scrolling,
             // nothing
@@ -227,7 +231,7 @@ impl Display {
             | [0xA8, 63]
             | [0xD3, 0]
             | [0xDA, 0x12]
-            | [0x40 | 0xA4 | 0x2E | 0xE3] => {}
+            | [0x40 | 0x2E | 0xE3] => {}
             [command, ..] => self.unknown.push(command),
             [] => {}
         }

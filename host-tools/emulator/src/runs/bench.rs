@@ -6,7 +6,7 @@ mod gates;
 mod inputs;
 mod on_the_rig;
 mod row;
-#[path = "../../../../firmware/src/bench/workload.rs"]
+#[path = "../../../../firmware/src/workload.rs"]
 pub mod workload;
 
 use std::path::PathBuf;

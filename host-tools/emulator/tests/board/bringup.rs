@@ -5,6 +5,8 @@
 //! A mistake's evening begins with the step that should find it, as if those before had passed earlier: the journal
 //! makes that possible.
 
+mod bare;
+mod fingers;
 mod mistakes;
 
 use std::cell::{Cell, RefCell};
@@ -12,27 +14,31 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use tactus_core::sensor::FingerName;
 use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as ProbeReport, Reset};
-use tactus_emulator::board::{Emulator, Options, pins};
+use tactus_emulator::board::{Emulator, Options, Output, pins};
 use tactus_emulator::host::talk::{Talk, TalkError};
 use tactus_link::Request;
 use tactus_link::bringup::judge::Finding;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, Operator, Person, Probe,
-    Report, STEPS, Step, Trouble,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, MISTAKES, OTHER_MISTAKES, Operator,
+    Person, Probe, Product, Report, STEPS, Step, Trouble,
 };
 use tactus_world::encoder::Cut;
 use tactus_world::faults::Fault;
+use tactus_world::parts::PartFault;
 use tactus_world::person::{Hand, Manner};
 use tactus_world::stage::{SUPPLY_V, TRAVEL_MM};
 use tactus_world::wiring::Miswired;
 use tactus_world::world::{Reached, Setup, Truth, World};
 
 use crate::common::elf_of;
+use crate::silicon_image::cross_kernels;
 
 /// The bench: the emulated board with its rig, and what somebody is about to do with it.
 struct Rig {
+    built: Built,
     emulator: RefCell<Emulator>,
     /// when the hand lets the finger go, ns
     lets_go_ns: Cell<Option<u64>>,
@@ -105,6 +111,15 @@ impl Board for Wire<'_> {
         self.say(measure)?;
         self.hello()
     }
+
+    fn traffic(&self) -> [u32; 3] {
+        self.1.traffic
+    }
+
+    fn times_ms(&self) -> [u64; 2] {
+        let now_ms = self.0.emulator.borrow().now_ns() as f64 * 1e-6;
+        [self.1.at_ms.into(), (now_ms * self.0.built.pc_clock) as u64]
+    }
 }
 
 /// The rig's firmware at the other end of the link.
@@ -138,6 +153,8 @@ struct Helper<'r> {
     /// the finger's mount and the stage when they were to be watched, mm
     watched: (f64, f64),
     logic_v: f64,
+    /// the potentiometer, from one end to the other
+    turned: f64,
 }
 
 impl<'r> Helper<'r> {
@@ -146,6 +163,7 @@ impl<'r> Helper<'r> {
             bench,
             watched: (0.0, 0.0),
             logic_v,
+            turned: 0.0,
         }
     }
 
@@ -166,6 +184,10 @@ impl<'r> Helper<'r> {
     fn push(&self, to_mm: f64) {
         self.rig().world(|world| world.push_stage(to_mm));
         self.rig().run_ms(3000);
+    }
+
+    fn button(&self, high: bool) {
+        self.rig().emulator.borrow_mut().press(high).unwrap();
     }
 
     fn hold(&self, manner: Manner) {
@@ -195,8 +217,21 @@ impl Person for Helper<'_> {
             self.push(TRAVEL_MM - 3.5);
         } else if begins("Push it back to its middle") {
             self.push(TRAVEL_MM / 2.0);
-        } else if begins("Take the finger off") {
+        } else if begins("Take the finger off") || begins("Lay the finger down as it is") {
             self.hold(Manner::default());
+        } else if begins("With the USB plug out") {
+            for wire in [
+                "1 CS to PD14 (D10)",
+                "5 DIN to PB5 (D22)",
+                "6 DOUT to PA6 (D12)",
+                "7 CLK to PA5 (D13)",
+            ] {
+                assert!(please.contains(wire), "{please}");
+            }
+        } else if begins("Leave the button") || begins("Let the button go") {
+            self.button(self.rig().built.button.unwrap_or(false));
+        } else if begins("Press the button") {
+            self.button(self.rig().built.button.unwrap_or(true));
         } else if begins("Connect the stage's motor") {
             self.rig().world(|world| world.replace_motor(None));
         } else if begins("Lay the finger down with its tip up") {
@@ -223,6 +258,13 @@ impl Person for Helper<'_> {
             let truth = self.truth();
             self.watched = (truth.tip_mm, truth.stage_mm);
         }
+        Ok(())
+    }
+
+    fn show(&mut self, _: &str) -> Result<(), Trouble> {
+        self.turned = f64::min(self.turned + 0.05, 1.0);
+        let inputs = (self.rig().built.inputs)(self.turned);
+        self.rig().world(|world| world.wire_converter(inputs));
         Ok(())
     }
 
@@ -254,6 +296,15 @@ impl Person for Helper<'_> {
             if answers[0] == "up" { up_mm } else { -up_mm }
         } else if question.starts_with("The stage went") {
             truth.stage_mm - stage_mm
+        } else if question.starts_with("Is the whole display lit") {
+            let picture = self.rig().emulator.borrow().rig().display().picture();
+            let is_lit = picture.is_some_and(|it| it.bytes().iter().all(|points| *points == 0xFF));
+            return Ok(usize::from(!is_lit));
+        } else if question.starts_with("Did the buzzer sound") {
+            let emulator = self.rig().emulator.borrow();
+            let sounds = |(_, output): &(u64, Output)| *output == Output::Buzzer(Some(2000));
+            let heard = self.rig().built.buzzer && emulator.rig().trace().any(sounds);
+            return Ok(usize::from(!heard));
         } else {
             return Ok(usize::from(
                 self.rig().world(|world| world.has_motor_supply()),
@@ -314,6 +365,18 @@ struct Built {
     clock: bool,
     logic_v: f64,
     brown_out: u8,
+    product: Product,
+    finger: FingerName,
+    /// counts at the converter's inputs where the potentiometer is turned so far
+    inputs: fn(f64) -> [u16; 2],
+    wrong_kernels: bool,
+    parts: Vec<PartFault>,
+    display: bool,
+    /// level at which the button's pin stays
+    button: Option<bool>,
+    buzzer: bool,
+    /// seconds of the PC's clock in a second
+    pc_clock: f64,
 }
 
 impl Default for Built {
@@ -326,6 +389,15 @@ impl Default for Built {
             clock: true,
             logic_v: 3.3,
             brown_out: 0,
+            product: Product::Rig,
+            finger: FingerName::Biotac,
+            inputs: |turned| [(4095.0 * turned) as u16, 4095],
+            wrong_kernels: false,
+            parts: Vec::new(),
+            display: true,
+            button: None,
+            buzzer: true,
+            pc_clock: 1.0,
         }
     }
 }
@@ -338,7 +410,21 @@ fn start(elf: &Path, built: &Built, store: Option<Vec<u8>>) -> Emulator {
         store,
         ..Options::default()
     };
-    let mut emulator = Emulator::start(elf, Setup::default(), options).unwrap();
+    let setup = Setup {
+        finger: built.finger,
+        ..Setup::default()
+    };
+    let mut emulator = Emulator::start(elf, setup, options).unwrap();
+    if built.wrong_kernels {
+        cross_kernels(elf, &mut emulator);
+    }
+    emulator.rig().display_mut().plug(built.display);
+    for fault in &built.parts {
+        emulator.rig().world().break_part(*fault);
+    }
+    if built.product == Product::Bare {
+        emulator.rig().world().wire_converter((built.inputs)(0.0));
+    }
     for mistake in &built.mistakes {
         emulator.rig().world().miswire(*mistake);
     }
@@ -354,6 +440,7 @@ fn start(elf: &Path, built: &Built, store: Option<Vec<u8>>) -> Emulator {
 /// The steps with the self-test image; the board afterwards.
 fn with_self_test(elf: &Path, built: &Built, journal: &mut Journal) -> (Ended, Emulator) {
     let rig = Rig {
+        built: built.clone(),
         emulator: RefCell::new(start(elf, built, None)),
         lets_go_ns: Cell::new(None),
     };
@@ -363,11 +450,19 @@ fn with_self_test(elf: &Path, built: &Built, journal: &mut Journal) -> (Ended, E
     if journal.has_passed("switches") {
         helper.done("Push the stage to its middle").unwrap();
     }
-    let ended = bringup::run(Ends::SelfTest(&mut wire), &mut helper, journal);
+    let ended = bringup::run(
+        built.product,
+        Ends::SelfTest(&mut wire),
+        &mut helper,
+        journal,
+    );
     let ended = ended.unwrap_or_else(|why| {
         let mut emulator = rig.emulator.borrow_mut();
         let resets = emulator.resets().unwrap();
-        panic!("{why}: {resets:?}, {}", Report::new(journal).text())
+        panic!(
+            "{why}: {resets:?}, {}",
+            Report::new(built.product, journal).text()
+        )
     });
     // weights, and the squeeze of a hand, and no more
     let force_max_n = rig.world(|world| world.truth().force_max_n);
@@ -394,11 +489,13 @@ fn with_rig(
     }
     let mut linked = Linked(talk);
     let ended = bringup::run(
+        built.product,
         Ends::Rig(&mut linked),
         &mut Helper::new(None, built.logic_v),
         journal,
     );
-    let ended = ended.unwrap_or_else(|why| panic!("{why}: {}", Report::new(journal).text()));
+    let ended =
+        ended.unwrap_or_else(|why| panic!("{why}: {}", Report::new(built.product, journal).text()));
     let board = linked.0.into_board();
     let force_max_n = board.rig().world().truth().force_max_n;
     assert!(force_max_n < 2.2, "{force_max_n} N");
@@ -415,7 +512,7 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
     let folder = std::env::temp_dir().join(name);
     std::fs::create_dir_all(&folder).unwrap();
     let mut journal = Journal::open(&folder.join("journal.jsonl")).unwrap();
-    for step in STEPS.iter().take(from) {
+    for step in built.product.steps().into_iter().take(from) {
         let found = Finding::default();
         journal
             .add(Entry::new(step, NOW.to_owned(), &found))
@@ -423,7 +520,7 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
     }
     let (mut ended, mut store) = (Ended::Flash(Image::Rig), None);
     let mut boards = Vec::new();
-    if bringup::next_image(&journal) == Some(Image::SelfTest) {
+    if bringup::next_image(built.product, &journal) == Some(Image::SelfTest) {
         let (how, mut board) = with_self_test(&self_test, built, &mut journal);
         (ended, store) = (how, Some(board.store().unwrap()));
         boards.push(board);
@@ -433,10 +530,14 @@ fn evening(built: &Built, from: usize) -> Option<Evening> {
         ended = how;
         boards.push(board);
     }
-    let report = Report::new(&journal);
+    let report = Report::new(built.product, &journal);
     report.write(&folder).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
-    let step = STEPS.iter().rfind(|step| journal.last(step.key).is_some());
+    let step = built
+        .product
+        .steps()
+        .into_iter()
+        .rfind(|step| journal.last(step.key).is_some());
     let last = step.and_then(|step| journal.last(step.key)).unwrap();
     // one mistake may be named at two pins
     let named: BTreeSet<String> = last.mistakes.iter().map(|one| one.key.clone()).collect();
@@ -479,7 +580,8 @@ struct Case(&'static str, &'static str, Built);
 /// Plays cases, and asserts that each is named where it should be, with what to do about it.
 fn play(cases: impl IntoIterator<Item = Case>) {
     for Case(step, mistake, built) in cases {
-        let from = STEPS.iter().position(|one| one.key == step).unwrap();
+        let mut steps = built.product.steps().into_iter();
+        let from = steps.position(|one| one.key == step).unwrap();
         let Some(evening) = evening(&built, from) else {
             return;
         };
@@ -490,7 +592,8 @@ fn play(cases: impl IntoIterator<Item = Case>) {
             (step, &[mistake.to_owned()][..]),
             "{text}"
         );
-        let known = MISTAKES.iter().find(|one| one.key == mistake).unwrap();
+        let mut all = MISTAKES.iter().chain(OTHER_MISTAKES);
+        let known = all.find(|one| one.key == mistake).unwrap();
         assert!(
             text.contains(known.what) && text.contains(known.remedy),
             "{text}"

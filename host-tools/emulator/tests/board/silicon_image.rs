@@ -100,19 +100,23 @@ fn smlads(elf: &Path) -> Vec<u64> {
 }
 
 /// SMLAD with its halves crossed, SMLADX, in all places: nobody but the kernels in assembly has it.
-#[test]
-fn a_wrong_kernel_fails() {
-    let Some(elf) = elf_of("TACTUS_SILICON_ELF") else {
-        return;
-    };
-    let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
-    let smlads = smlads(&elf);
+pub(crate) fn cross_kernels(elf: &Path, board: &mut Emulator) {
+    let smlads = smlads(elf);
     assert!(smlads.len() > 10, "{} SMLAD", smlads.len());
     for at in smlads {
         let mut second = [0; 2];
         second.copy_from_slice(&board.read(at + 2, 2).unwrap());
         board.write(at + 2, &[second[0] | 0x10, second[1]]).unwrap();
     }
+}
+
+#[test]
+fn a_wrong_kernel_fails() {
+    let Some(elf) = elf_of("TACTUS_SILICON_ELF") else {
+        return;
+    };
+    let mut board = Emulator::start(&elf, Setup::default(), Options::default()).unwrap();
+    cross_kernels(&elf, &mut board);
     let log = run(&mut board);
     let failed = failed(&log);
     for name in ["band power", "slide"] {

@@ -1,11 +1,13 @@
 //! What measurements of a new rig mean: limits, and which mistake shows like this. Pure functions of what the board and
 //! the person at it said.
 
+pub(crate) mod bare;
 pub mod mounted;
 
+use tactus_core::sensor::FingerName;
 use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::limits::{
-    BRAKING_A, CURRENT_RMS, CURRENT_ZERO, LEVER_PLAY, PAC_RMS, PDC, WEAK_A,
+    BRAKING_A, CURRENT_RMS, CURRENT_ZERO, LEVER_PLAY, WEAK_A,
 };
 use tactus_core::wire::bringup::{
     ChipSeen, LeverSeen, Look, Pin, PinsSeen, SensorSeen, StageSeen, Stopped, Tied,
@@ -114,9 +116,8 @@ pub fn chip(seen: &ChipSeen, reset: Reset, last_words: Option<&str>) -> Finding 
 
 /// Judges the parts on the pins, the sensor selected and the stage anywhere.
 pub fn pins(seen: &PinsSeen) -> Finding {
+    let mut finding = finger_pins(seen);
     let tied = |pin| seen.tied(pin);
-    let words = Pin::ALL.map(|pin| format!("{}: {}", place(pin), word(tied(pin))));
-    let mut finding = Finding::new(words.join(", "));
     for pin in [Pin::LeverTop, Pin::StageLeft, Pin::StageRight, Pin::EStop] {
         finding = finding.wrong(tied(pin) == Tied::High, &m::TIED_HIGH, place(pin));
     }
@@ -125,16 +126,21 @@ pub fn pins(seen: &PinsSeen) -> Finding {
         .wrong(a && b, &m::ENCODER_SILENT, "PD12 and PD13")
         .wrong(a && !b, &m::ENCODER_LINE, place(Pin::EncoderA))
         .wrong(b && !a, &m::ENCODER_LINE, place(Pin::EncoderB));
-    let exchanged = tied(Pin::Miso) == Tied::Floating && tied(Pin::Mosi) != Tied::Floating;
-    finding = finding.wrong(exchanged, &m::DATA_EXCHANGED, "PA6 and PB5");
-    for (pin, level) in [
-        (Pin::Select, Tied::High),
-        (Pin::LeverEnable, Tied::Low),
-        (Pin::StageEnable, Tied::Low),
-    ] {
-        finding = finding.wrong(tied(pin) != level, &m::PULL_MISSING, place(pin));
+    for pin in [Pin::LeverEnable, Pin::StageEnable] {
+        finding = finding.wrong(tied(pin) != Tied::Low, &m::PULL_MISSING, place(pin));
     }
     finding
+}
+
+/// The same of a probe without motors.
+pub(crate) fn finger_pins(seen: &PinsSeen) -> Finding {
+    let tied = |pin| seen.tied(pin);
+    let words = Pin::ALL.map(|pin| format!("{}: {}", place(pin), word(tied(pin))));
+    let exchanged = tied(Pin::Miso) == Tied::Floating && tied(Pin::Mosi) != Tied::Floating;
+    let open = tied(Pin::Select) != Tied::High;
+    Finding::new(words.join(", "))
+        .wrong(exchanged, &m::DATA_EXCHANGED, "PA6 and PB5")
+        .wrong(open, &m::PULL_MISSING, place(Pin::Select))
 }
 
 fn word(tied: Tied) -> &'static str {
@@ -181,25 +187,39 @@ pub fn sensor(seen: &SensorSeen) -> Finding {
     let silent = 2 * seen.silent > seen.words;
     let low = silent && seen.last == [0, 0];
     let damaged = seen.garbled + seen.error_frames + seen.silent + seen.late;
+    // a part that fails costs a quarter of the words or more, a cable a few
+    let fails = seen.identity.is_err() && 20 * damaged > seen.words;
+    let cell = fails && who.contains("four wires");
+    let part = fails && !cell && PARTS.iter().any(|part| who.contains(part));
+    let other = cell || part;
+    let words = damaged > WORDS || seen.identity.is_err();
     Finding::new(saw)
         .wrong(low, &m::MISO_STUCK, "low")
-        .wrong(silent && !low, &m::SENSOR_SILENT, "")
-        .wrong(
-            !silent && (damaged > WORDS || seen.identity.is_err()),
-            &m::WORDS,
-            "",
-        )
+        .wrong(cell, &m::CELL, "")
+        .wrong(part, &m::PART, "")
+        .wrong(silent && !low && !other, &m::SENSOR_SILENT, "")
+        .wrong(!silent && !other && words, &m::WORDS, "")
+}
+
+/// Parts that a `mems` has.
+const PARTS: [&str; 2] = ["IIS3DWB", "ADS1220"];
+
+fn finger(seen: &SensorSeen) -> FingerName {
+    let number = usize::from(seen.finger.0);
+    FingerName::ALL.get(number).copied().unwrap_or_default()
 }
 
 /// Judges the sensor's readings without finger on anything.
 pub fn noise(seen: &SensorSeen) -> Finding {
     let ([_, pac], [pdc, pdc_rms]) = (seen.pac, seen.pdc);
+    let at_rest = finger(seen).parts().model.at_rest;
+    let ((still, noisy), (low, high)) = (at_rest.pac_noise_counts, at_rest.pdc_counts);
     Finding::new(format!(
         "P_AC {pac:.2} counts rms, P_DC {pdc:.0} counts, {pdc_rms:.2} rms"
     ))
-    .wrong(pac < *PAC_RMS.start(), &m::SENSOR_STILL, "")
-    .wrong(pac > *PAC_RMS.end(), &m::SENSOR_NOISY, "")
-    .wrong(!PDC.contains(&pdc), &m::SENSOR_FILLING, "")
+    .wrong(pac < still, &m::SENSOR_STILL, "")
+    .wrong(pac > noisy, &m::SENSOR_NOISY, "")
+    .wrong(!(low..=high).contains(&pdc), &m::SENSOR_FILLING, "")
 }
 
 /// The switches in the order in which somebody presses them.

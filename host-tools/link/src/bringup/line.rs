@@ -12,12 +12,17 @@ pub struct Line {
     frame: Vec<u8>,
     /// Frames that another image sent.
     others: u32,
+    /// Questions, their answers, and damaged frames.
+    pub traffic: [u32; 3],
+    /// Time of the last answer since the board started, ms.
+    pub at_ms: u32,
 }
 
 impl Line {
     /// The frame of a question.
     pub fn question(&mut self, measure: Measure) -> Result<Vec<u8>, Trouble> {
         self.id = self.id.wrapping_add(1);
+        self.traffic[0] += 1;
         let ask = Ask {
             id: self.id,
             mark: MARK,
@@ -45,14 +50,15 @@ impl Line {
                 Ok(answer) if answer.mark == MARK => {
                     self.others = 0;
                     if answer.id == self.id {
-                        found = Some(answer.saw);
+                        (found, self.at_ms) = (Some(answer.saw), answer.at_ms);
+                        self.traffic[1] += 1;
                     }
                 }
                 _ if decode::<Report>(&mut frame.clone()).is_ok() => self.others += 1,
                 _ if decode::<Ask>(&mut frame).is_ok_and(|ask| ask.mark == MARK) => {
                     return Err(Trouble::Echo);
                 }
-                _ => {}
+                _ => self.traffic[2] += u32::from(!frame.is_empty()),
             }
         }
         // a rig that has just started says much by itself, and answers no question of ours

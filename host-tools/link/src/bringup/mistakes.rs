@@ -21,14 +21,16 @@ pub struct Named {
 }
 
 macro_rules! mistakes {
-    ($($name:ident = $key:literal: $what:literal, $remedy:literal;)*) => {
+    ($(#[$doc:meta])* $all:ident: $($name:ident = $key:literal: $what:literal, $remedy:literal;)*) => {
         $(pub(super) static $name: Mistake = Mistake { key: $key, what: $what, remedy: $remedy };)*
-        /// All of them, in the order in which the steps look for them.
-        pub static MISTAKES: &[&Mistake] = &[$(&$name),*];
+        $(#[$doc])*
+        pub static $all: &[&Mistake] = &[$(&$name),*];
     };
 }
 
 mistakes! {
+    /// Those of a rig, in the order in which the steps look for them.
+    MISTAKES:
     SUPPLY = "supply": "a supply is not what it should be",
         "Measure it again at the pin that is named, everything connected; replace the supply or find what pulls it \
              down";
@@ -138,4 +140,37 @@ mistakes! {
         "Report what it says; the rig works, but forgets at power-off";
     WATCHDOG = "watchdog": "the watchdog does not start the board again",
         "Replace the board";
+}
+
+mistakes! {
+    /// Those of bare boards, of handhelds, and of fingers that are no BioTac.
+    OTHER_MISTAKES:
+    LINK = "link": "answers of the board are lost or damaged",
+        "Another USB cable, straight into the PC; no other program at the port";
+    KERNEL = "kernel": "the chip computes other results by its kernels than by their plain twins",
+        "Flash the image again; if it stays so, report it, and do not use the board";
+    CYCLES = "cycles": "the chip takes more cycles than the model and 30 %",
+        "Report it, with the report";
+    TIMER = "timer": "a timer or the converter does not keep its period",
+        "Power the board off and on; if it stays so, report it, and do not use the board";
+    FLASH = "flash": "the flash does not take, keep or erase data, or its last sector is not blank",
+        "Erase that sector with STM32CubeProgrammer; if it stays so, replace the board";
+    CONVERTER_INPUT = "converter-input": "the converter's CH1 is not at 3.3 V",
+        "Its pin 3 belongs to 3V3, its pin 2 to the potentiometer's middle: see whether they are exchanged";
+    POTENTIOMETER = "potentiometer": "the potentiometer does not reach both ends",
+        "Its middle belongs to CH0, one end to 3V3, the other one to GND; turn it as far as it goes";
+    PART = "part": "a part of the finger does not answer as it must",
+        "The part that is named: its power, ground and chip select (IIS3DWB PD14, ADS1220 PD15), then its other wires";
+    CELL = "cell": "the load cell is at an end of its range",
+        "Its four wires: two of the supply, two of the signal; then the amplifier's supply and reference";
+    DISPLAY_SILENT = "display-silent": "the display does not answer",
+        "Its supply of 3.3 V and ground, SCL PB8, SDA PB9 (exchanged?), and address 0x3C";
+    DISPLAY_DARK = "display-dark": "the display answers and stays dark",
+        "Replace it: an SSD1306 of 128 x 64 points";
+    BUTTON_DEAD = "button-dead": "the button does nothing",
+        "It leads from PC13 to 3.3 V while it is pressed";
+    BUTTON_STUCK = "button-stuck": "the button is pressed, or its pin tied to 3.3 V",
+        "Look for a short of PC13 to 3.3 V, and for a button that sticks";
+    BUZZER = "buzzer": "the buzzer is silent",
+        "A passive one, from PC9 to ground";
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::journal::{Entry, Journal};
-use super::steps::STEPS;
+use super::steps::Product;
 use crate::whole::write_whole;
 
 /// The knowledge of a rig.
@@ -31,8 +31,10 @@ struct ReportStep {
 
 impl Report {
     /// That of a journal.
-    pub fn new(journal: &Journal) -> Self {
-        let steps = STEPS.iter().map(|step| ReportStep {
+    pub fn new(product: Product, journal: &Journal) -> Self {
+        let steps = product.steps();
+        let passed = steps.iter().all(|step| journal.has_passed(step.key));
+        let steps = steps.iter().map(|step| ReportStep {
             step: step.key,
             checks: step.checks,
             limit: (step.limit)(),
@@ -40,7 +42,7 @@ impl Report {
         });
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            passed: STEPS.iter().all(|step| journal.has_passed(step.key)),
+            passed,
             steps: steps.collect(),
         }
     }

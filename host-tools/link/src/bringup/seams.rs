@@ -44,6 +44,12 @@ pub trait Board {
     /// Asks for something that ends with a new start of the board, and waits for that: why it started; `None` if it
     /// does not.
     fn restart(&mut self, measure: Measure) -> Result<Option<Reset>, Trouble>;
+
+    /// Questions, their answers, and damaged frames so far.
+    fn traffic(&self) -> [u32; 3];
+
+    /// Time of the board at its last answer, and of the PC now, ms.
+    fn times_ms(&self) -> [u64; 2];
 }
 
 /// The rig's firmware at the other end of a line.
@@ -63,6 +69,8 @@ pub trait Person {
     fn done(&mut self, please: &str) -> Result<(), Trouble>;
     /// Looks at something that moves in a moment.
     fn watch(&mut self, please: &str) -> Result<(), Trouble>;
+    /// Sees a value that changes.
+    fn show(&mut self, value: &str) -> Result<(), Trouble>;
     /// Presses a switch and keeps it pressed, or lets it go.
     fn press(&mut self, switch: Pin, pressed: bool) -> Result<(), Trouble>;
     /// Begins to squeeze the finger and lays it down; the board watches.

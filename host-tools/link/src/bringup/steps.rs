@@ -1,10 +1,12 @@
 //! The steps of the first evening, in their order.
 
+use tactus_core::sensor::FingerName;
 use tactus_core::sensor::pressure::SLOTS_HZ;
 use tactus_core::wire::bringup::{
     Look, MAX_POINTS, Measure, POINTS, Pin, Saw, SensorSeen, Stopped, limits,
 };
 
+use super::bare::{BARE, HAND};
 use super::judge::mounted::{AIR_COUNTS, OFF_LINE, SPEED_SHARE, UNEVEN_MM};
 use super::judge::{
     self, BRAKING_MA, CORE_KHZ, COUNTS_PER_MM, Finding, GAIN, LEVER_MM, LOGIC_V, MOTOR_V, SWITCHES,
@@ -42,6 +44,37 @@ impl Step {
     }
 }
 
+/// What is brought up.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Product {
+    /// A board without anything.
+    Bare,
+    /// The rig of the paper.
+    Rig,
+    /// The handheld.
+    Handheld,
+    /// A probe on an arm or a printer.
+    Arm,
+}
+
+/// The steps of a probe without motors; a handheld has those of [`HAND`], too.
+const FINGER: [&str; 8] = [
+    "chip", "pins", "sensor", "noise", "finger", "store", "watchdog", "scale",
+];
+
+impl Product {
+    /// Its steps, in their order.
+    pub fn steps(self) -> Vec<&'static Step> {
+        let finger = STEPS.iter().filter(|step| FINGER.contains(&step.key));
+        match self {
+            Self::Bare => BARE.iter().collect(),
+            Self::Rig => STEPS.iter().collect(),
+            Self::Handheld => HAND.iter().chain(finger).collect(),
+            Self::Arm => finger.collect(),
+        }
+    }
+}
+
 /// An image of the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Image {
@@ -55,6 +88,8 @@ pub enum Image {
 pub struct Bench<'b> {
     pub(super) board: &'b mut dyn Board,
     pub(super) person: &'b mut dyn Person,
+    /// It is a rig's.
+    pub(super) has_motors: bool,
 }
 
 macro_rules! ask {
@@ -65,6 +100,7 @@ macro_rules! ask {
         }
     };
 }
+pub(super) use ask;
 
 /// Weights that somebody has, and what one g is, mN.
 const WEIGHTS_G: [u8; 3] = [50, 100, 150];
@@ -126,7 +162,11 @@ pub static STEPS: &[Step] = &[
         run: Run::SelfTest(|bench| {
             // the pins are looked at when the board starts, before their drivers have them
             bench.board.restart(Measure::Restart)?;
-            Ok(judge::pins(&ask!(bench, Measure::Pins, Pins)))
+            let seen = ask!(bench, Measure::Pins, Pins);
+            Ok(match bench.has_motors {
+                true => judge::pins(&seen),
+                false => judge::finger_pins(&seen),
+            })
         }),
     },
     Step {
@@ -141,10 +181,12 @@ pub static STEPS: &[Step] = &[
         checks: "what the sensor says without contact",
         how: "the finger lies still, nothing touches it",
         limit: || {
-            let (pac, pdc) = (&limits::PAC_RMS, &limits::PDC);
-            let [(pac_from, pac_to), (pdc_from, pdc_to)] =
-                [pac, pdc].map(|one| (one.start(), one.end()));
-            format!("P_AC {pac_from} to {pac_to} counts rms, P_DC {pdc_from} to {pdc_to} counts")
+            let limits = FingerName::ALL.map(|finger| {
+                let at_rest = finger.parts().model.at_rest;
+                let ((still, noisy), (low, high)) = (at_rest.pac_noise_counts, at_rest.pdc_counts);
+                format!("`{finger}` {still} to {noisy}, {low} to {high}")
+            });
+            format!("counts of P_AC (rms) and P_DC: {}", limits.join("; "))
         },
         run: Run::SelfTest(|bench| {
             bench
@@ -453,7 +495,7 @@ fn ask_stage(
 }
 
 impl Bench<'_> {
-    fn hello(&mut self) -> Result<(tactus_core::wire::Reset, Option<String>), Trouble> {
+    pub(super) fn hello(&mut self) -> Result<(tactus_core::wire::Reset, Option<String>), Trouble> {
         match self.board.ask(Measure::Hello)? {
             Saw::Hello {
                 reset, last_words, ..
@@ -473,8 +515,10 @@ impl Bench<'_> {
     /// True if the person squeezed the finger, which is off its mount.
     fn squeeze(&mut self) -> Result<Result<(), Stopped>, Trouble> {
         // P_DC's rest is that of the last second of words
-        self.person
-            .done("Take the finger off its mount, its cable on, and lay it down")?;
+        self.person.done(match self.has_motors {
+            true => "Take the finger off its mount, its cable on, and lay it down",
+            false => "Lay the finger down as it is in its handle or holder, its tip free",
+        })?;
         self.sensor()?;
         self.look()?;
         self.person.squeeze()?;

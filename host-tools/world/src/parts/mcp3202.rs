@@ -25,6 +25,8 @@ pub(crate) struct Mcp3202 {
     /// chip select is low, in a mode that it works in
     on: bool,
     pub(super) unplugged: bool,
+    /// something else than a finger is at its inputs
+    pub(crate) inputs: Option<[u16; 2]>,
 }
 
 impl Mcp3202 {

@@ -18,6 +18,13 @@ impl World {
         }
     }
 
+    /// Has an MCP3202 read these counts at its inputs, and not a finger.
+    pub fn wire_converter(&mut self, inputs: [u16; 2]) {
+        if let Peers::Analog(converter) = &mut self.peers {
+            converter.inputs = Some(inputs);
+        }
+    }
+
     /// Levels at the chip's MISO and MOSI while the sensor is selected and has no clock; `None` if nothing drives them.
     pub fn data_lines(&self) -> [Option<bool>; 2] {
         let plugged = match &self.peers {

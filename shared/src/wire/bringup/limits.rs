@@ -1,16 +1,5 @@
 //! Limits of what is right in a new rig, for the host that judges its measurements.
 
-use core::ops::RangeInclusive;
-
-use crate::sensor::AtRest;
-use crate::sensor::biotac;
-
-const AT_REST: AtRest = biotac::PARTS.model.at_rest;
-
-/// P_AC of a BioTac that nobody touches, counts rms. Less is a dead converter, more is a bad ground.
-pub const PAC_RMS: RangeInclusive<f32> = AT_REST.pac_noise_counts.0..=AT_REST.pac_noise_counts.1;
-/// P_DC of a finger filled as it should be, in air, counts.
-pub const PDC: RangeInclusive<f32> = AT_REST.pdc_counts.0..=AT_REST.pdc_counts.1;
 /// P_DC rises by so much when a hand squeezes the finger, mN.
 pub const SQUEEZED_MN: f32 = 230.0;
 /// What the converter reads without current, counts: half of its reference; and how far it may be off, which is far

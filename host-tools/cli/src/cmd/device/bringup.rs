@@ -10,8 +10,8 @@ use tactus_core::wire::bringup::{Measure, Pin, Saw};
 use tactus_core::wire::{Command, Report as ProbeReport, Reset};
 use tactus_link::Request;
 use tactus_link::bringup::{
-    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Report, Step,
-    Trouble, judge,
+    self, Board, Ended, Ends, Entry, Image, Journal, Line, Operator, Person, Probe, Product,
+    Report, Step, Trouble, judge,
 };
 
 use super::bench::{Bench, BenchError, Interrupt};
@@ -27,6 +27,7 @@ Examples:
   cargo xtask flash --self-test            the image that measures; it stays on the board until it has passed
   tactus device bringup                    goes on where it stopped last time
   tactus device bringup --report rig2      another rig
+  tactus device bringup --bare             a board without a rig: ten minutes, then a MCP3202 on a breadboard
 
 Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each
 step that is over is kept in DIR/journal.jsonl; DIR/report.txt and report.json are to be sent to somebody who helps.
@@ -38,6 +39,15 @@ pub(crate) struct Args {
     /// Folder of the journal and of the report
     #[arg(long, value_name = "DIR", default_value = "bringup")]
     report: PathBuf,
+    /// Check a board without a rig: clocks, kernels, timers, flash, link, and a converter on a breadboard
+    #[arg(long)]
+    bare: bool,
+    /// Check a handheld: display, button, buzzer and finger
+    #[arg(long, conflicts_with = "bare")]
+    handheld: bool,
+    /// Check a probe on an arm or a printer: its finger
+    #[arg(long, conflicts_with_all = ["bare", "handheld"])]
+    arm: bool,
 }
 
 /// A board that starts answers within this.
@@ -65,16 +75,23 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         interrupt: interrupt.clone(),
         lines: lines(),
     };
-    let done = if bringup::next_image(&journal) == Some(Image::Rig) {
+    let product = match how {
+        Args { bare: true, .. } => Product::Bare,
+        Args { handheld: true, .. } => Product::Handheld,
+        Args { arm: true, .. } => Product::Arm,
+        _ => Product::Rig,
+    };
+    let done = if bringup::next_image(product, &journal) == Some(Image::Rig) {
         let (bench, _) = Bench::open(&place, Format::Text)?;
         let mut linked = Linked(bench);
-        bringup::run(Ends::Rig(&mut linked), &mut person, &mut journal)
+        bringup::run(product, Ends::Rig(&mut linked), &mut person, &mut journal)
     } else {
         let open = place.open().map_err(BenchError::from)?;
         let mut board = Serial {
             open,
             line: Line::default(),
             interrupt,
+            began: Instant::now(),
         };
         say(
             "Looking for the self-test. If nothing comes in a minute, press the board's black button.",
@@ -82,10 +99,13 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         board
             .hello(STARTS)
             .and_then(|reset| reset.ok_or(Trouble::Silent))
-            .and_then(|_| bringup::run(Ends::SelfTest(&mut board), &mut person, &mut journal))
+            .and_then(|_| {
+                let ends = Ends::SelfTest(&mut board);
+                bringup::run(product, ends, &mut person, &mut journal)
+            })
     };
     made.keep();
-    let report = Report::new(&journal);
+    let report = Report::new(product, &journal);
     report.write(&how.report)?;
     write!(out, "{}", report.text())?;
     out.flush()?;
@@ -94,6 +114,12 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         "The report is in {folder}: report.txt and report.json."
     ));
     match done.map_err(BenchError::BringUp)? {
+        Ended::Passed if how.bare => {
+            say("All steps have passed: the board is sound. Please send the report");
+        }
+        Ended::Passed if product != Product::Rig => say(
+            "All steps have passed. Next: flash its own image (cargo xtask flash --help), then tactus device calibrate",
+        ),
         Ended::Passed => {
             say("All steps have passed. Next: tactus device identify, or tactus device train");
         }
@@ -134,6 +160,7 @@ struct Serial {
     open: Open,
     line: Line,
     interrupt: Interrupt,
+    began: Instant,
 }
 
 impl Serial {
@@ -211,6 +238,17 @@ impl Board for Serial {
         self.say(measure)?;
         self.hello(Duration::from_secs(10))
     }
+
+    fn traffic(&self) -> [u32; 3] {
+        self.line.traffic
+    }
+
+    fn times_ms(&self) -> [u64; 2] {
+        [
+            self.line.at_ms.into(),
+            self.began.elapsed().as_millis() as u64,
+        ]
+    }
 }
 
 /// Who sits before the terminal.
@@ -265,6 +303,11 @@ impl Person for Terminal {
 
     fn watch(&mut self, please: &str) -> Result<(), Trouble> {
         self.line(&format!("{please} Enter starts it.")).map(|_| ())
+    }
+
+    fn show(&mut self, value: &str) -> Result<(), Trouble> {
+        ask_for(format_args!("\r  {value} "));
+        Ok(())
     }
 
     fn press(&mut self, switch: Pin, pressed: bool) -> Result<(), Trouble> {

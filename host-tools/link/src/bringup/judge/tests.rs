@@ -6,7 +6,9 @@ use std::panic::Location;
 
 use tactus_core::rig::calibration::RigCalibration;
 use tactus_core::rig::unloaded::SPEEDS_UM_S;
+use tactus_core::sensor::FingerCode;
 use tactus_core::sensor::pressure::Calibration;
+use tactus_core::wire::bringup::{Checked, ConverterSeen, HandSeen};
 use tactus_core::wire::{Live, SlideReport};
 
 use super::mounted::SlideSeen;
@@ -67,6 +69,7 @@ fn pins_but(others: &[(Pin, Tied)]) -> Finding {
 fn sensor_second() -> SensorSeen {
     let text = |words: &str| words.try_into().unwrap();
     SensorSeen {
+        finger: FingerCode::BIOTAC,
         identity: Ok(text("BT-1")),
         words: 4400,
         garbled: 0,
@@ -281,6 +284,55 @@ fn slid_with(change: impl Fn(&mut SlideReport)) -> Finding {
     slid(|seen| seen.observed.iter_mut().for_each(&change))
 }
 
+/// A second of the line: answers of 100 questions, damaged frames, the PC's ms.
+fn lines(answered: u32, damaged: u32, host_ms: u64) -> Finding {
+    bare::link([100, answered, damaged], 40_000, [1000, host_ms])
+}
+
+fn checked(names: &[&str], bad: &str) -> Finding {
+    let all = names
+        .iter()
+        .map(|name| Checked::new(name, *name != bad, "1"));
+    bare::checks(&all.collect::<Vec<_>>())
+}
+
+const BOARD: [&str; 5] = [
+    "frame",
+    "cycles",
+    "slot timer",
+    "current's ring",
+    "flash erase",
+];
+
+fn readings(undriven: u16, counts: [[u16; 2]; 2]) -> ConverterSeen {
+    ConverterSeen {
+        read: 480,
+        undriven,
+        counts,
+    }
+}
+
+fn converted(undriven: u16, counts: [[u16; 2]; 2]) -> Finding {
+    bare::converter(&readings(undriven, counts))
+}
+
+fn turns(undriven: u16, low: u16, high: u16) -> Finding {
+    let first = readings(0, [[low, low + 9], [4095; 2]]);
+    bare::turned(&[first, readings(undriven, [[high - 9, high], [4095; 2]])])
+}
+
+fn of_parts(finger: FingerName, why: &str, error_frames: u32) -> Finding {
+    sensor_but(|seen| {
+        seen.finger = FingerCode::of(finger);
+        seen.identity = Err(why.try_into().unwrap());
+        seen.error_frames = error_frames;
+    })
+}
+
+fn hand(display: bool, pressed: bool) -> HandSeen {
+    HandSeen { display, pressed }
+}
+
 macro_rules! cases {
     ($($name:literal: $found:expr => $($key:literal $place:literal),*;)*) => {
         const CASES: &[Case] = &[$(($name, || $found, &[$(($key, $place)),*])),*];
@@ -464,6 +516,45 @@ cases! {
     "no traction": slid_with(|slide| slide.properties[0] = None) => "slide-traction" "";
     "traction that pushes": slid_with(|slide| slide.properties[0] = Some(-0.1)) => "slide-traction" "";
     "no slide": slid(|seen| seen.observed = None) => "fault" "";
+    "a sound finger's pins": finger_pins(&PinsSeen { up: u16::MAX, down: u16::MAX }) => ;
+    "a cut wire of the cell": of_parts(FingerName::Analog, "check its four wires", 2200) => "cell" "";
+    "a part that is off": of_parts(FingerName::Mems, "the IIS3DWB is off", 2200) => "part" "";
+    "a few damaged words": of_parts(FingerName::Mems, "the IIS3DWB is off", 220) => "words" "";
+    "a still analog finger": noise(&SensorSeen { finger: FingerCode::of(FingerName::Analog), pac: [0.0, 0.5],
+        pdc: [1000.0, 0.5], ..sensor_second() }) => ;
+    "a display": bare::display(&hand(true, false), true) => ;
+    "a display that is not there": bare::display(&hand(false, false), false) => "display-silent" "";
+    "a dark display": bare::display(&hand(true, false), false) => "display-dark" "";
+    "a button": bare::button(&hand(true, false), &hand(true, true)) => ;
+    "a stuck button": bare::button(&hand(true, true), &hand(true, true)) => "button-stuck" "";
+    "a dead button": bare::button(&hand(true, false), &hand(true, false)) => "button-dead" "";
+    "a buzzer": bare::buzzer(true) => ;
+    "no buzzer": bare::buzzer(false) => "buzzer" "";
+    "a sound line": lines(100, 0, 1002) => ;
+    "a lost answer": lines(99, 0, 1000) => "link" "";
+    "a damaged frame": lines(100, 1, 1000) => "link" "";
+    "a slow clock": lines(100, 0, 1004) => "clock" "by the PC's";
+    "a fast clock": lines(100, 0, 996) => "clock" "by the PC's";
+    "a bare chip": bare::clocks(&ChipSeen { brown_out: 3, ..CHIP }, Reset::Power, None) => ;
+    "a bare chip by its own clock": bare::clocks(&ChipSeen { external: false, ..CHIP }, Reset::Power, None)
+        => "clock" "";
+    "sound checks": checked(&BOARD, "") => ;
+    "no checks": checked(&[], "") => "kernel" "";
+    "a wrong kernel": checked(&BOARD, "frame") => "kernel" "";
+    "a slow kernel": checked(&BOARD, "cycles") => "cycles" "";
+    "a wrong timer": checked(&BOARD, "slot timer") => "timer" "TIM2";
+    "a wrong ring": checked(&BOARD, "current's ring") => "timer" "ADC1 and DMA2";
+    "a wrong flash": checked(&BOARD, "flash erase") => "flash" "";
+    "a converter": converted(0, [[0, 9], [4015, 4095]]) => ;
+    "an undriven reading": converted(1, [[0, 4095], [4095; 2]]) => "sensor-silent" "the MCP3202";
+    "no null bit": converted(480, [[u16::MAX; 2]; 2]) => "sensor-silent" "the MCP3202";
+    "zeros": converted(0, [[0; 2]; 2]) => "miso-stuck" "low";
+    "CH1 elsewhere": converted(0, [[0, 9], [4014, 4095]]) => "converter-input" "";
+    "a whole turn": turns(0, 80, 4015) => ;
+    "a turn with a silence": turns(1, 80, 4015) => "sensor-silent" "the MCP3202";
+    "a turn from GND": turns(0, 80, 4014) => "potentiometer" "not to 3V3";
+    "a turn from 3.3 V": turns(0, 81, 4015) => "potentiometer" "not to GND";
+    "half a turn": turns(0, 81, 4014) => "potentiometer" "to neither end";
     "a slide that failed": slid(|seen| seen.failed = Some("force".to_owned())) => "fault" "";
 }
 
@@ -491,6 +582,7 @@ fn no_check_could_be_left_out() {
     for (file, source) in [
         ("bringup/judge.rs", include_str!("../judge.rs")),
         ("judge/mounted.rs", include_str!("mounted.rs")),
+        ("judge/bare.rs", include_str!("bare.rs")),
     ] {
         for (text, line) in source.lines().zip(1..) {
             if !text.contains(".wrong(") {
@@ -503,5 +595,5 @@ fn no_check_could_be_left_out() {
             assert!(!failing.is_empty(), "{file}:{line} could be left out");
         }
     }
-    assert!(checks > 75, "{checks}");
+    assert!(checks > 85, "{checks}");
 }
