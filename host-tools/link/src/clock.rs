@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// A clock that began with a line. Where `TACTUS_CLOCK` names a file, its eight bytes are the ns of an emulated board: a
-/// PC that is too slow for the board shall not see it late.
+/// A clock that began with a line. Where `TACTUS_CLOCK` names a file, its eight bytes are the ns of an emulated board:
+/// a PC that is too slow for the board shall not see it late.
 #[derive(Debug)]
 pub(crate) struct Clock {
     began: Instant,

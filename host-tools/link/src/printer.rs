@@ -50,8 +50,8 @@ pub enum PrinterError {
     NoSample(f64),
     /// The sample is not where it was, or its ends are not at one height.
     #[error(
-        "the sample is felt {0:.1} mm higher or lower than it should be: does it lie flat below the whole slide, and does \
-         the axis move as far as it is told (a move of 50 mm, measured with a ruler)? Then run the command again"
+        "the sample is felt {0:.1} mm higher or lower than it should be: does it lie flat below the whole slide, and \
+         does the axis move as far as it is told (a move of 50 mm, measured with a ruler)? Then run the command again"
     )]
     Elsewhere(f64),
     /// The force does not become the one that is wanted.

@@ -1,8 +1,9 @@
-//! Tactus in a browser: a simulated probe, [`Session`], one at a line, [`Remote`], and [`OwnFiles`], as WebAssembly, asked in JSON.
+//! Tactus in a browser: a simulated probe, [`Session`], one at a line, [`Remote`], and [`OwnFiles`], as WebAssembly,
+//! asked in JSON.
 //!
 //! Seven functions and the module's memory are the whole interface, so that neither wasm-bindgen nor its command is
-//! needed: the page writes a request where [`request`] says, calls [`ask`], [`remote`] or [`own`], and reads the reply where
-//! [`reply`] says. The module imports nothing.
+//! needed: the page writes a request where [`request`] says, calls [`ask`], [`remote`] or [`own`], and reads the reply
+//! where [`reply`] says. The module imports nothing.
 
 use std::cell::RefCell;
 

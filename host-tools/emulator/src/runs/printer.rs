@@ -10,12 +10,10 @@ use clap::Args as Arguments;
 use tactus_core::sensor::FingerName;
 use tactus_lab::sim::collection::{Collection, texture_name};
 use tactus_lab::sim::printer::{learn_on, measured};
-use tactus_link::Request;
 
 use super::serve::{PrinterFirmware, Served, TcpLine};
 use crate::board::Options;
 use crate::host::args::{Firmware, Format};
-use crate::host::talk::{TIMEOUT_S, Talk};
 use crate::host::under_finger::mounted;
 
 /// The finger must never feel more, N.
@@ -52,7 +50,7 @@ pub(crate) struct Args {
     format: Format,
 }
 
-/// True if the verdict is right, or was printed for a program. Errors: something was not as it must be, such as the force.
+/// True if the verdict is right, or was printed for a program. Errors: something was not as it must be.
 pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     let text = args.format == Format::Text;
     args.firmware.show(text)?;
@@ -118,9 +116,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     })?;
     let force_max_n = served.board.rig().world().truth().force_max_n;
     let seconds = (served.board.now_ns() - began_ns) as f64 * 1e-9;
-    let mut talk = Talk::new(served.board);
-    let counts = talk.run(Request::status(), TIMEOUT_S, |_, _| {})?.counts;
-    let (resets, violations) = (talk.board().resets()?, talk.board().violations()?);
+    let (resets, violations) = (served.board.resets()?, served.board.violations()?);
     let verdict = &json["verdict"];
     let says = verdict["texture"].as_str().unwrap_or_default();
     let ending = match (verdict["told"] == "sure", says == truth) {
@@ -130,8 +126,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     };
     if text {
         println!(
-            "{ending}: it says {verdict} after {} slides and {seconds:.0} s, it was {truth}; at most {force_max_n:.2} N \
-             by the world.",
+            "{ending}: it says {verdict} after {} slides and {seconds:.0} s, it was {truth}; at most {force_max_n:.2} \
+             N by the world.",
             verdict["slides"],
         );
     } else {
@@ -143,9 +139,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
             "seconds": seconds,
             "force_max_n": force_max_n,
             "force_errors": [],
-            "lost": u64::from(counts.lost_samples) + u64::from(counts.lost_reports),
-            "late": counts.late_slots,
-            "damaged": counts.parity_errors + counts.error_frames,
         });
         println!("{line}");
     }

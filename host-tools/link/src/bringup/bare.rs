@@ -185,7 +185,8 @@ fn wiring(pins: [u8; 4]) -> String {
         }
     });
     format!(
-        "With the USB plug out (q ends this; the same command goes on), put an MCP3202 on a breadboard and wire its pins: 1 CS to {select}, 2 CH0 to the \
+        "With the USB plug out (q ends this; the same command goes on), put an MCP3202 on a breadboard and wire its \
+         pins: 1 CS to {select}, 2 CH0 to the \
          potentiometer's middle, 3 CH1 to 3V3, 4 VSS to GND, 5 DIN to {mosi}, 6 DOUT to {miso}, 7 CLK to {clock}, 8 \
          VDD to 3V3; the potentiometer's ends to 3V3 and GND; nothing to 5V"
     )

@@ -33,8 +33,7 @@ pub(super) fn run(files: &Files) -> Result<()> {
     let told = tactus("evaluate --recordings recordings --runs 20")?;
     ensure!(told.contains("denim"), "{told}");
     // the maker, whose probe is not plugged in
-    let told = tactus("device doctor --port /dev/no-probe")
-        .map_or_else(|why| why.to_string(), |told| told);
+    let told = tactus("device doctor --port /dev/no-probe").unwrap_or_else(|why| why.to_string());
     ensure!(told.contains("no-probe"), "{told}");
     // the inspector
     let told = tactus("verify --simulated --texture corkboard --material marble")?;
