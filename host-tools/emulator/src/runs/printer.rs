@@ -117,14 +117,30 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
     let force_max_n = served.board.rig().world().truth().force_max_n;
     let seconds = (served.board.now_ns() - began_ns) as f64 * 1e-9;
     let (resets, violations) = (served.board.resets()?, served.board.violations()?);
-    let verdict = &json["verdict"];
+    let ending = tell(args, &json["verdict"], truth, (seconds, force_max_n));
+    ensure!(resets.is_empty(), "the board has started anew: {resets:?}");
+    ensure!(
+        violations.is_empty(),
+        "not as the vendor has it: {violations:?}"
+    );
+    ensure!(force_max_n < MOST_N, "{force_max_n:.2} N on the finger");
+    Ok(ending == "Right" || !text)
+}
+
+/// Prints the verdict, and returns how the exploration ended.
+fn tell(
+    args: &Args,
+    verdict: &serde_json::Value,
+    truth: &str,
+    (seconds, force_max_n): (f64, f64),
+) -> &'static str {
     let says = verdict["texture"].as_str().unwrap_or_default();
     let ending = match (verdict["told"] == "sure", says == truth) {
         (true, true) => "Right",
         (true, false) => "Wrong",
         _ => "Undecided",
     };
-    if text {
+    if args.format == Format::Text {
         println!(
             "{ending}: it says {verdict} after {} slides and {seconds:.0} s, it was {truth}; at most {force_max_n:.2} \
              N by the world.",
@@ -142,13 +158,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<bool> {
         });
         println!("{line}");
     }
-    ensure!(resets.is_empty(), "the board has started anew: {resets:?}");
-    ensure!(
-        violations.is_empty(),
-        "not as the vendor has it: {violations:?}"
-    );
-    ensure!(force_max_n < MOST_N, "{force_max_n:.2} N on the finger");
-    Ok(ending == "Right" || !text)
+    ending
 }
 
 /// Serves board and printer until a command ends.
