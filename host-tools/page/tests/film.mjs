@@ -5,7 +5,7 @@ import { launch, tab } from "./browser.mjs";
 
 const [page, chromium, film] = process.argv.slice(2);
 /// Frames a second, how much faster than life, how long the end stands, how well a frame is kept.
-const FPS = 8, FASTER = 1.2, END_MS = 2000, QUALITY = 0.6;
+const FPS = 8, FASTER = 1.2, END_MS = 2000, QUALITY = 0.33;
 const WIDE = 1400, SCALE = 0.7;
 
 // The page's clock stands unless `advance` moves it.

@@ -33,6 +33,7 @@ use tactus_world::stage::{SUPPLY_V, TRAVEL_MM};
 use tactus_world::wiring::Miswired;
 use tactus_world::world::{Reached, Setup, Truth, World};
 
+use self::mistakes::{Case, play};
 use crate::common::elf_of;
 use crate::silicon_image::cross_kernels;
 
@@ -572,49 +573,4 @@ fn a_rig_as_in_the_book_passes_from_its_zero_on() {
 #[ignore = "long"]
 fn a_rig_as_in_the_book_passes() {
     passes(STEPS[0].key);
-}
-
-/// A mistake of whoever built a rig, the step that finds it, and its name.
-struct Case(&'static str, &'static str, Built);
-
-/// Plays cases, and asserts that each is named where it should be, with what to do about it.
-fn play(cases: impl IntoIterator<Item = Case>) {
-    for Case(step, mistake, built) in cases {
-        let mut steps = built.product.steps().into_iter();
-        let from = steps.position(|one| one.key == step).unwrap();
-        let Some(evening) = evening(&built, from) else {
-            return;
-        };
-        let text = &evening.text;
-        assert!(!evening.passed, "{mistake}: {text}");
-        assert_eq!(
-            (evening.failed.as_str(), &evening.named[..]),
-            (step, &[mistake.to_owned()][..]),
-            "{text}"
-        );
-        let mut all = MISTAKES.iter().chain(OTHER_MISTAKES);
-        let known = all.find(|one| one.key == mistake).unwrap();
-        assert!(
-            text.contains(known.what) && text.contains(known.remedy),
-            "{text}"
-        );
-    }
-}
-
-fn miswired(step: &'static str, mistake: &'static str, miswired: Miswired) -> Case {
-    let mistakes = vec![miswired];
-    let built = Built {
-        mistakes,
-        ..Built::default()
-    };
-    Case(step, mistake, built)
-}
-
-fn broken(step: &'static str, mistake: &'static str, fault: Fault) -> Case {
-    let faults = vec![fault];
-    let built = Built {
-        faults,
-        ..Built::default()
-    };
-    Case(step, mistake, built)
 }

@@ -3,6 +3,7 @@
 use tactus_core::wire::bringup::{KERNELS, Measure, READINGS, Saw};
 
 use super::judge::{Finding, bare as judge, watchdog};
+use super::mistakes as m;
 use super::seams::Trouble;
 use super::steps::{Bench, Run, Step, ask};
 
@@ -45,7 +46,7 @@ pub(super) static BARE: &[Step] = &[
             for number in 0..KERNELS {
                 all.extend(ask!(bench, Measure::Kernel(number), Checks));
             }
-            Ok(judge::checks(&all))
+            Ok(judge::checks(&all, &m::KERNEL))
         }),
     },
     Step {
@@ -53,14 +54,24 @@ pub(super) static BARE: &[Step] = &[
         checks: "the timer of the slots, the converter and its DMA",
         how: "the board counts their cycles",
         limit: || BY_THE_BOARD.to_owned(),
-        run: Run::SelfTest(|bench| Ok(judge::checks(&ask!(bench, Measure::Timers, Checks)))),
+        run: Run::SelfTest(|bench| {
+            Ok(judge::checks(
+                &ask!(bench, Measure::Timers, Checks),
+                &m::TIMER,
+            ))
+        }),
     },
     Step {
         key: "flash",
         checks: "the flash's writes and erases",
         how: "the board writes to its last sector, reads it, and erases it",
         limit: || BY_THE_BOARD.to_owned(),
-        run: Run::SelfTest(|bench| Ok(judge::checks(&ask!(bench, Measure::Flash, Checks)))),
+        run: Run::SelfTest(|bench| {
+            Ok(judge::checks(
+                &ask!(bench, Measure::Flash, Checks),
+                &m::FLASH,
+            ))
+        }),
     },
     Step {
         key: "reset",

@@ -2,6 +2,55 @@
 
 use super::*;
 
+/// A mistake of whoever built a rig, the step that finds it, and its name.
+pub(super) struct Case(
+    pub(super) &'static str,
+    pub(super) &'static str,
+    pub(super) Built,
+);
+
+/// Plays cases, and asserts that each is named where it should be, with what to do about it.
+pub(super) fn play(cases: impl IntoIterator<Item = Case>) {
+    for Case(step, mistake, built) in cases {
+        let mut steps = built.product.steps().into_iter();
+        let from = steps.position(|one| one.key == step).unwrap();
+        let Some(evening) = evening(&built, from) else {
+            return;
+        };
+        let text = &evening.text;
+        assert!(!evening.passed, "{mistake}: {text}");
+        assert_eq!(
+            (evening.failed.as_str(), &evening.named[..]),
+            (step, &[mistake.to_owned()][..]),
+            "{text}"
+        );
+        let mut all = MISTAKES.iter().chain(OTHER_MISTAKES);
+        let known = all.find(|one| one.key == mistake).unwrap();
+        assert!(
+            text.contains(known.what) && text.contains(known.remedy),
+            "{text}"
+        );
+    }
+}
+
+fn miswired(step: &'static str, mistake: &'static str, miswired: Miswired) -> Case {
+    let mistakes = vec![miswired];
+    let built = Built {
+        mistakes,
+        ..Built::default()
+    };
+    Case(step, mistake, built)
+}
+
+fn broken(step: &'static str, mistake: &'static str, fault: Fault) -> Case {
+    let faults = vec![fault];
+    let built = Built {
+        faults,
+        ..Built::default()
+    };
+    Case(step, mistake, built)
+}
+
 #[test]
 fn a_mistake_of_a_kind_is_named() {
     play([

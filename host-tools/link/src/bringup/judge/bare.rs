@@ -4,7 +4,7 @@
 use tactus_core::wire::Reset;
 use tactus_core::wire::bringup::{Checked, ChipSeen, ConverterSeen, HandSeen};
 
-use super::{Finding, chip, m};
+use super::{Finding, Mistake, chip, m};
 
 /// Counts near 0 V and near 3.3 V, of 4095: a potentiometer's last 2 %, and a converter's errors.
 pub(crate) const LOW: u16 = 80;
@@ -42,26 +42,18 @@ pub(crate) fn clocks(seen: &ChipSeen, reset: Reset, last_words: Option<&str>) ->
     finding
 }
 
-/// Checks that the board has judged.
-pub(crate) fn checks(all: &[Checked]) -> Finding {
+/// Checks that the board has judged: this mistake, or that a kernel is slow.
+pub(crate) fn checks(all: &[Checked], mistake: &'static Mistake) -> Finding {
     let said = all
         .iter()
         .map(|one| format!("{}: {}", one.name, one.measured));
-    let mut finding = Finding::new(said.collect::<Vec<_>>().join("; "));
-    let failed = |name: &str| {
-        all.iter()
-            .any(|one| !one.good && one.name.starts_with(name))
+    let failed = |slow| {
+        let mut bad = all.iter().filter(|one| !one.good);
+        bad.any(|one| (one.name == "cycles") == slow)
     };
-    let others = ["cycles", "slot timer", "current's ring", "flash"];
-    let known = |one: &Checked| others.iter().any(|name| one.name.starts_with(name));
-    let kernel = all.is_empty() || all.iter().any(|one| !one.good && !known(one));
-    finding = finding
-        .wrong(kernel, &m::KERNEL, "")
-        .wrong(failed("cycles"), &m::CYCLES, "")
-        .wrong(failed("slot timer"), &m::TIMER, "TIM2")
-        .wrong(failed("current's ring"), &m::TIMER, "ADC1 and DMA2")
-        .wrong(failed("flash"), &m::FLASH, "");
-    finding
+    Finding::new(said.collect::<Vec<_>>().join("; "))
+        .wrong(all.is_empty() || failed(false), mistake, "")
+        .wrong(failed(true), &m::CYCLES, "")
 }
 
 /// A converter whose CH1 is at its supply.
@@ -95,13 +87,14 @@ pub(crate) fn turned(all: &[ConverterSeen]) -> Finding {
 
 /// A handheld's display, which a person sees.
 pub(crate) fn display(seen: &HandSeen, lit: bool) -> Finding {
-    let (answers, lit_) = (seen.display, if lit { "lit" } else { "dark" });
+    let answers = seen.display;
     let answer = if answers {
         "answers"
     } else {
         "does not answer"
     };
-    Finding::new(format!("it {answer}, and is {lit_}"))
+    let light = if lit { "lit" } else { "dark" };
+    Finding::new(format!("it {answer}, and is {light}"))
         .wrong(!answers, &m::DISPLAY_SILENT, "")
         .wrong(answers && !lit, &m::DISPLAY_DARK, "")
 }
