@@ -84,6 +84,7 @@ pub fn run(
                 let now = person.now();
                 let digits = now.chars().filter(char::is_ascii_digit).take(8);
                 run(&mut Mounted {
+                    has_motors: product == Product::Rig,
                     weighed: weighed.map_or(Vec::new(), |entry| entry.points.clone()),
                     today: digits.collect::<String>().parse().unwrap_or(0),
                     probe: &mut **probe,

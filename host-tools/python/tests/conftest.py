@@ -1,5 +1,6 @@
 """Where recordings and the command are. A test that lacks something is skipped, and fails where it must not be."""
 
+import contextlib
 import os
 import pathlib
 import signal
@@ -45,6 +46,12 @@ def received(line):
         return line.recv(4096)
     except ConnectionResetError:
         return b""
+
+
+def sent(line, said):
+    """Sends it to a host that may have gone by then."""
+    with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+        line.sendall(said)
 
 
 def data(name):

@@ -8,7 +8,7 @@ import threading
 import time
 
 import pytest
-from conftest import ROOT, received
+from conftest import ROOT, received, sent
 
 import tactus
 
@@ -29,7 +29,7 @@ class Probe:
         self.force_mn = 0
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = "tcp:127.0.0.1:%d" % self.listener.getsockname()[1]
-        self.failed = None
+        self.failed, self.lock = None, threading.Lock()
         threading.Thread(target=self.serve, daemon=True).start()
 
     def serve(self):
@@ -55,9 +55,10 @@ class Probe:
         self.tell({"Done": id_})
 
     def tell(self, event):
-        report = {"number": self.number, "at_ms": 0, "event": event}
-        self.number = (self.number + 1) % 65536
-        self.line.sendall(client.frame(client.write("Report", report)))
+        with self.lock:  # two threads say something
+            report = {"number": self.number, "at_ms": 0, "event": event}
+            self.number = (self.number + 1) % 65536
+            sent(self.line, client.frame(client.write("Report", report)))
 
     def order(self, number, task):
         self.tell({"Arm": {"number": number, "task": task}})

@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import ROOT, received
+from conftest import ROOT, received, sent
 
 import tactus
 
@@ -68,7 +68,7 @@ class Probe:
     def tell(self, line, event):
         report = {"number": self.number, "at_ms": 50 * self.number, "event": event}
         self.number = (self.number + 1) % 65536
-        line.sendall(client.frame(client.write("Report", report)))
+        sent(line, client.frame(client.write("Report", report)))
 
 
 def chosen(slide):

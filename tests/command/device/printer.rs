@@ -137,10 +137,8 @@ fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
             "tactus device printer setup",
         ],
     );
-    let setup = |answers: &str| {
-        let mut command = at.command(
-            "device printer setup --port PORT --printer PRINTER --printer-setup mine.json",
-        );
+    let answered = |line: &str, answers: &str| {
+        let mut command = at.command(line);
         let mut running = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -157,6 +155,10 @@ fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
             ended.status.code(),
             String::from_utf8(ended.stdout).unwrap(),
         )
+    };
+    let setup = |answers| {
+        let line = "device printer setup --port PORT --printer PRINTER --printer-setup mine.json";
+        answered(line, answers)
     };
     // nothing moves, and nothing is kept, before the way is free
     let (code, said) = setup("n\n");
@@ -214,6 +216,35 @@ fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
     );
     let kept = std::fs::read_to_string(at.path("mine.json")).unwrap();
     assert!(kept.contains("\"parked\": ["), "{kept}");
+    // the self-test has found nothing wrong; what is left of the first evening is by the printer
+    let passed = |key: &str, points: &str| {
+        format!(
+            "{{\"step\":\"{key}\",\"at\":\"2026-11-29T19:30:00Z\",\"passed\":true,\"saw\":\"\",\
+             \"mistakes\":[],\"points\":[{points}]}}\n"
+        )
+    };
+    let journal: String = [
+        "chip", "pins", "sensor", "noise", "finger", "store", "watchdog",
+    ]
+    .map(|key| passed(key, ""))
+    .concat();
+    let weighed = passed("scale", "[43,494.5],[85,977.5],[128,1472.0]");
+    std::fs::create_dir(at.path("first")).unwrap();
+    std::fs::write(at.path("first/journal.jsonl"), journal + &weighed).unwrap();
+    let (code, said) = answered(
+        "device bringup --report first --port PORT --printer --printer-setup mine.json",
+        "\n\n",
+    );
+    println!("{said}");
+    assert_eq!(code, Some(0), "{said}");
+    assert_says(
+        &said,
+        &[
+            "passed  zero",
+            "force scale 11.50 mN a count",
+            "passed  slide",
+        ],
+    );
 }
 
 #[test]

@@ -363,7 +363,7 @@ impl Rig {
         }
         if too_fast || self.spi_control & CR1_LSB_FIRST != 0 {
             self.world.spi_byte(mosi.reverse_bits());
-            return 0xFF;
+            return self.world.idle_miso();
         }
         let miso = self.world.spi_byte(mosi);
         // other fingers' parts know the mode since they were selected

@@ -17,6 +17,8 @@ pub struct Mounted<'b> {
     pub(super) weighed: Vec<[f64; 2]>,
     /// Today, as 20261124.
     pub(super) today: u32,
+    /// It is a rig's; else a printer moves the finger.
+    pub(super) has_motors: bool,
 }
 
 impl Mounted<'_> {
@@ -51,9 +53,10 @@ impl Mounted<'_> {
     }
 
     pub(super) fn zero(&mut self) -> Result<Finding, Trouble> {
-        self.person.done(
-            "Put the finger on its mount and computer paper under it, on the stage; nothing else is near",
-        )?;
+        self.person.done(match self.has_motors {
+            true => "Put the finger on its mount and computer paper under it, on the stage; nothing else is near",
+            false => "Fix computer paper on the sample's place. The finger hangs lifted, and nothing touches it",
+        })?;
         let first = self.constants(Command::Calibrate)?;
         let second = match &first {
             Ok(_) => self.constants(Command::Calibrate)?,
@@ -99,9 +102,13 @@ impl Mounted<'_> {
     }
 
     pub(super) fn slide(&mut self) -> Result<Finding, Trouble> {
-        self.person
-            .watch("The finger comes down and slides over the paper once. Press the emergency stop if it does \
-                 anything else.")?;
+        let stop = match self.has_motors {
+            true => "Press the emergency stop",
+            false => "Switch the printer off",
+        };
+        self.person.watch(&format!(
+            "The finger comes down and slides over the paper once. {stop} if it does anything else."
+        ))?;
         let mut seen = SlideSeen::default();
         let mut first_ms = None;
         let one = Identify {
@@ -138,6 +145,6 @@ impl Mounted<'_> {
             Ok(counts) => seen.counts = counts,
             Err(why) => seen.failed = Some(why),
         }
-        Ok(judge::slide(&seen))
+        Ok(judge::slide(&seen, self.has_motors))
     }
 }

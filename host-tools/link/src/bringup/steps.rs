@@ -53,8 +53,10 @@ pub enum Product {
     Rig,
     /// The handheld.
     Handheld,
-    /// A probe on an arm or a printer.
+    /// A probe on an arm.
     Arm,
+    /// A probe on a printer, which also slides once.
+    Printer,
 }
 
 /// The steps of a probe without motors; a handheld has those of [`HAND`], too.
@@ -71,6 +73,12 @@ impl Product {
             Self::Rig => STEPS.iter().collect(),
             Self::Handheld => HAND.iter().chain(finger).collect(),
             Self::Arm => finger.collect(),
+            Self::Printer => {
+                let mounted = STEPS
+                    .iter()
+                    .filter(|step| ["zero", "slide"].contains(&step.key));
+                finger.chain(mounted).collect()
+            }
         }
     }
 }

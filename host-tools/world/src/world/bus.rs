@@ -58,7 +58,7 @@ impl World {
     /// select, by MISO's pull-up.
     pub fn spi_byte(&mut self, mosi: u8) -> u8 {
         let Some(count) = self.selected else {
-            return Miso::idle(&self.faults);
+            return self.idle_miso();
         };
         let fraction = self.fraction();
         let said = self
@@ -74,6 +74,11 @@ impl World {
         }
         let line = sensor.line().get(count).copied();
         line.unwrap_or(Miso::idle(&self.faults))
+    }
+
+    /// MISO of a part that drives nothing: its pull-up, or the level that it is tied to.
+    pub fn idle_miso(&self) -> u8 {
+        Miso::idle(&self.faults)
     }
 
     /// The sensor's chip select rises; time does not pass by it.

@@ -28,6 +28,7 @@ Examples:
   tactus device bringup                    goes on where it stopped last time
   tactus device bringup --report rig2      another rig
   tactus device bringup --bare             a board without a rig: ten minutes, then a MCP3202 on a breadboard
+  tactus device bringup --printer PORT     a finger on a 3D printer, up to its first slide
 
 Answers are lines of the standard input: Enter for \"done\", a number, or the number of a choice; q ends it. Each
 step that is over is kept in DIR/journal.jsonl; DIR/report.txt and report.json are to be sent to somebody who helps.
@@ -45,9 +46,16 @@ pub(crate) struct Args {
     /// Check a handheld: display, button, buzzer and finger
     #[arg(long, conflicts_with = "bare")]
     handheld: bool,
-    /// Check a probe on an arm or a printer: its finger
+    /// Check a probe on an arm: its finger
     #[arg(long, conflicts_with_all = ["bare", "handheld"])]
     arm: bool,
+    /// Check a probe on a 3D printer with this port: its finger, then a slide; that of its set-up unless given
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "")]
+    #[arg(conflicts_with_all = ["bare", "handheld", "arm"])]
+    printer: Option<String>,
+    /// File of the printer's set-up, and not ~/.local/share/tactus/printer.json
+    #[arg(long, value_name = "FILE", requires = "printer")]
+    printer_setup: Option<PathBuf>,
 }
 
 /// A board that starts answers within this.
@@ -69,7 +77,9 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     let interrupt = Interrupt::catch()?;
     let place = Where {
         port: how.port.clone(),
-        ..Where::default()
+        printer: how.printer.clone(),
+        printer_setup: how.printer_setup.clone(),
+        log: None,
     };
     let mut person = Terminal {
         interrupt: interrupt.clone(),
@@ -79,6 +89,9 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Args { bare: true, .. } => Product::Bare,
         Args { handheld: true, .. } => Product::Handheld,
         Args { arm: true, .. } => Product::Arm,
+        Args {
+            printer: Some(_), ..
+        } => Product::Printer,
         _ => Product::Rig,
     };
     let done = if bringup::next_image(product, &journal) == Some(Image::Rig) {
@@ -117,12 +130,20 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Ended::Passed if how.bare => {
             say("All steps have passed: the board is sound. Please send the report");
         }
+        Ended::Passed if product == Product::Printer => say(
+            "All steps have passed. Next: tactus device record NAME NAME --printer --out mine, for a table of this \
+             machine",
+        ),
         Ended::Passed if product != Product::Rig => say(
             "All steps have passed. Next: flash its own image (cargo xtask flash --help), then tactus device calibrate",
         ),
         Ended::Passed => {
             say("All steps have passed. Next: tactus device identify, or tactus device train");
         }
+        Ended::Flash(_) if product == Product::Printer => say(
+            "The self-test has done its part. Next: flash tactus-arm (cargo xtask size names its file, then tactus \
+             device flash FILE), tactus device printer setup --printer PORT, and the same command again: it slides once",
+        ),
         Ended::Flash(_) => say(
             "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does \
              the last steps",

@@ -162,8 +162,8 @@ pub fn speed(why: Option<&str>, places: &[(u32, Live)]) -> Finding {
     .wrong(!missing && uneven_mm > UNEVEN_MM, &m::STAGE_SPEED, "uneven")
 }
 
-/// The first slide.
-pub fn slide(seen: &SlideSeen) -> Finding {
+/// The first slide. A rig also measures its traction.
+pub fn slide(seen: &SlideSeen, has_motors: bool) -> Finding {
     if let Some(why) = &seen.failed {
         return failed(why);
     }
@@ -194,7 +194,7 @@ pub fn slide(seen: &SlideSeen) -> Finding {
         "",
     )
     .wrong(
-        traction.is_none_or(|traction| traction <= 0.0),
+        has_motors && traction.is_none_or(|traction| traction <= 0.0),
         &m::SLIDE_TRACTION,
         "",
     )

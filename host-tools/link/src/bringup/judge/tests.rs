@@ -277,7 +277,7 @@ fn slid(change: impl Fn(&mut SlideSeen)) -> Finding {
         ..SlideSeen::default()
     };
     change(&mut seen);
-    mounted::slide(&seen)
+    mounted::slide(&seen, true)
 }
 
 fn slid_with(change: impl Fn(&mut SlideReport)) -> Finding {
