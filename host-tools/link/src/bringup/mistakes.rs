@@ -62,7 +62,7 @@ mistakes! {
     SENSOR_STILL = "sensor-still": "P_AC is too quiet: the sensor does not convert",
         "Power the sensor off and on; replace it if it stays so";
     SENSOR_NOISY = "sensor-noisy": "P_AC is too noisy",
-        "Lay the finger down and leave it; one ground for sensor, board and motors' supply, at one point";
+        "Leave the finger alone; one ground for sensor, board and motors; for a mems, what `words` asks for";
     SENSOR_FILLING = "sensor-filling": "P_DC is out of its range without contact",
         "Refill the finger as its manual says; keep off whatever presses it";
     SWITCH_OPEN = "switch-open": "a switch reads as open, pressed or not",
