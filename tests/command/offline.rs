@@ -330,6 +330,16 @@ fn a_gauge_study_compares_operators_of_several_folders() {
         let all = sd("gauge").unwrap().hypot(sd("part").unwrap());
         assert!((all / sd("total").unwrap() - 1.0).abs() < 1e-5, "{gauge}");
     }
+    // the best reading is the first row, and in the verdict
+    let text = at.printed("report --recordings SIMULATED");
+    let least = movements.iter().flat_map(|m| array(&m["properties"]));
+    let least = least.map(|gauge| number(&gauge["gauge_share"]));
+    let least = least.fold(1.0, f64::min);
+    let said = format!("{:.1} % of all variation is its own", 100.0 * least);
+    assert!(text.starts_with("The gauge is good by "), "{text}");
+    assert!(text.lines().next().unwrap().contains(&said), "{text}");
+    let row = text.lines().nth(4).unwrap();
+    assert!(row.contains(&format!("{:.1} %", 100.0 * least)), "{text}");
     // the same slides by two operators: nobody reads more than the other
     for name in ["Anna", "Ben"] {
         at.recordings(name, |line| match line.strip_suffix(",,,,biotac,,,1,,,") {
@@ -431,6 +441,13 @@ fn slides_are_verified_against_a_texture_of_a_table_and_of_recordings() {
         other["same_below"].as_f64().map(|x| (10.0 * x).round()),
         Some(-46.0)
     );
+    // the picture has all slides of the movement, and changes nothing in the answer
+    let denim = format!("{itself} --material 'Denim twill'");
+    let drawn = at.json(&format!("{denim} --plot pictures"), 3);
+    assert_eq!(drawn, at.json(&denim, 3));
+    let map = String::from_utf8(at.read("pictures/map.svg")).unwrap();
+    let slides = (1..=9).filter(|n| map.contains(&format!("Denim twill, slide {n}<")));
+    assert_eq!(slides.count(), 3, "{map}");
     // too strict a threshold leaves it open
     let open = at.json(&format!("{verify} burlap --threshold 1 --max-slides 1"), 4);
     assert_eq!(open["answer"], "unsure");

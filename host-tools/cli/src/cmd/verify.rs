@@ -20,10 +20,12 @@ use tactus_lab::eval::verified::{Slide, Verified, name, print_score, print_slide
 use tactus_lab::eval::verify::{false_accept, put};
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_lab::sim::rig::{SimError, SimRig};
+use tactus_study::pictures::map;
 
 use super::args::{Only, Stop};
 use super::names::find;
 use super::output::{Done, Format, UsageError, print_json};
+use super::plot::Plot;
 use super::progress::with_progress;
 use super::table_file::read_table;
 use super::textures::{find_material, find_textures, measure_folder, of_one_finger};
@@ -77,6 +79,8 @@ pub(crate) struct Args {
     seed: u64,
     #[command(flatten)]
     stop: Stop,
+    #[command(flatten)]
+    plot: Plot,
     /// How to print the answer
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -216,6 +220,7 @@ fn hold(
     out: &mut impl Write,
 ) -> anyhow::Result<Done> {
     let table = Table::read(bytes)?;
+    let canvas = args.plot.open()?;
     let config = Config {
         strategy: Strategy::Cycling,
         open: true,
@@ -225,6 +230,7 @@ fn hold(
     let mut explorer = explorer(bytes, measures, config, Some(&[texture]))?;
     verified.sample = Some(sample);
     verified.left_out = left_out;
+    let mut observed = Vec::new();
     for slide in slides.take(args.stop.max_slides.into()) {
         let slide = slide?;
         let Some(movement) = index_of(table, slide.movement) else {
@@ -234,6 +240,11 @@ fn hold(
             movement,
             property: None,
         };
+        observed.push((movement, slide.number, slide.observation.clone()));
+        if verified.answer != name(Answer::Unsure) {
+            // the picture shows the others, too
+            continue;
+        }
         explorer.observe(action, &slide.observation)?;
         let Some(now) = explorer.verification() else {
             continue;
@@ -247,7 +258,7 @@ fn hold(
             limit: now.limit,
             answer: name(now.answer),
         });
-        if now.answer != Answer::Unsure {
+        if now.answer != Answer::Unsure && canvas.is_none() {
             break;
         }
     }
@@ -260,6 +271,17 @@ fn hold(
     match args.format {
         Format::Json => print_json(&verified, out)?,
         Format::Text => print(&verified, out)?,
+    }
+    if let Some(canvas) = canvas {
+        // a map is of one movement
+        let first = observed.first().map_or(0, |(movement, ..)| *movement);
+        observed.retain(|(movement, ..)| *movement == first);
+        let slides = observed
+            .into_iter()
+            .map(|(_, number, slide)| (number, slide));
+        let sample = verified.sample.as_deref().unwrap_or("the sample");
+        let slides: Vec<_> = slides.collect();
+        canvas.write(&[map::with_slides(table, first, sample, &slides)?], out)?;
     }
     Ok(Done::of(verified.answer))
 }

@@ -33,11 +33,7 @@ pub fn distances(table: Table<'_>, at: Option<u8>) -> Vec<Vec<f64>> {
 
 /// Distance of a slide of a movement from each texture of a fused table, in standard deviations within a texture;
 /// `None` if it lacks features.
-pub(crate) fn slide_distances(
-    table: Table<'_>,
-    movement: u8,
-    slide: &Observation,
-) -> Option<Vec<f64>> {
+pub fn slide_distances(table: Table<'_>, movement: u8, slide: &Observation) -> Option<Vec<f64>> {
     let all = |one: &dyn Fn(u16) -> f64| (0..table.textures()).map(one).collect();
     match table.contents() {
         Contents::Fused(set, features) => {

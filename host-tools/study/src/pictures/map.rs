@@ -2,17 +2,43 @@
 
 use tactus_core::table::Table;
 
-use crate::chart::{Chart, Figure, MARKS, Series, WIDTH, buffer};
-use tactus_lab::eval::places::{Plane, distances, off};
+use crate::chart::{Chart, Figure, MARKS, Mark, Series, WIDTH, buffer};
+use tactus_core::features::Observation;
+use tactus_lab::eval::places::{Plane, distances, off, slide_distances};
 
 /// More textures than this have numbers in the map and a list of names below it.
 const NAMED: usize = 40;
 
 /// The map of a table's textures.
 pub fn figure(table: Table<'_>) -> anyhow::Result<Figure> {
-    let distances = distances(table, None);
+    drawn(table, None, "", &[])
+}
+
+/// The map at a movement, and numbered slides of that movement in it.
+pub fn with_slides(
+    table: Table<'_>,
+    movement: u8,
+    sample: &str,
+    slides: &[(u32, Observation)],
+) -> anyhow::Result<Figure> {
+    drawn(table, Some(movement), sample, slides)
+}
+
+fn drawn(
+    table: Table<'_>,
+    movement: Option<u8>,
+    sample: &str,
+    slides: &[(u32, Observation)],
+) -> anyhow::Result<Figure> {
+    let distances = distances(table, movement);
     let names: Vec<&str> = table.names().collect();
-    let places = Plane::of(&distances).places;
+    let plane = Plane::of(&distances);
+    let places = plane.places.clone();
+    let slides = slides.iter().filter_map(|(number, slide)| {
+        let from_all = slide_distances(table, movement?, slide)?;
+        Some((format!("{sample}, slide {number}"), plane.place(&from_all)))
+    });
+    let (says, slides): (Vec<String>, Vec<(f64, f64)>) = slides.unzip();
     let many = names.len() > NAMED;
     let nearest = distances.iter().enumerate().map(|(n, row)| {
         let others = row.iter().enumerate().filter(|&(other, _)| other != n);
@@ -44,6 +70,17 @@ pub fn figure(table: Table<'_>) -> anyhow::Result<Figure> {
         }
     }
     series.push(textures);
+    if !slides.is_empty() {
+        series.push(Series {
+            says,
+            ..Series::points(
+                1,
+                Mark::Cross,
+                format!("{sample}, each slide"),
+                slides.clone(),
+            )
+        });
+    }
     let below = format!(
         "Distance: in standard deviations between slides of one texture. In a plane distances are not quite right: \
          here they are off by {:.0} % (root mean square). Dashed: to the texture that is nearest in truth.",
@@ -59,14 +96,19 @@ pub fn figure(table: Table<'_>) -> anyhow::Result<Figure> {
     } else {
         below
     };
-    let (x_range, y_range, tall) = ranges(&places);
+    let (x_range, y_range, tall) = ranges(&[&places[..], &slides].concat());
     let axis = "distance (standard deviations)";
+    let at = movement.and_then(|at| table.movement(at));
+    let title = match at {
+        Some(movement) => format!("Textures and slides at {movement}"),
+        None => "Map of the table's textures".to_owned(),
+    };
     Chart {
         y_range,
         // the space above and below the axes, and as many lines as the chart makes of the words
         size: (WIDTH, tall + 88 + Chart::height_of(&below)),
         below: &below,
-        ..Chart::new("Map of the table's textures", axis, axis, x_range, series)
+        ..Chart::new(title, axis, axis, x_range, series)
     }
     .figure("map")
 }

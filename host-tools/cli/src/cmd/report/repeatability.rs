@@ -181,55 +181,99 @@ fn gauge(slides: &[Taken]) -> anyhow::Result<Gauged> {
     })
 }
 
+/// Rows and slides outside the limits that are printed, most.
+const ROWS: usize = 20;
+const OUTSIDE: usize = 5;
+
+/// What a gauge with this share of all variation is usually called.
+fn called(share: f64) -> &'static str {
+    match share {
+        ..0.1 => "good",
+        ..0.3 => "of use for coarse differences",
+        _ => "not acceptable",
+    }
+}
+
+fn in_percent(share: f64) -> String {
+    percent((share * 1000.0).round() / 1000.0)
+}
+
+/// The answer in a sentence: the reading that separates parts best.
+fn verdict(rows: &[(Movement, &Gauge)]) -> Option<String> {
+    let (movement, best) = rows.first()?;
+    let share = best.study.gauge_share;
+    let classes = match best.study.distinct_categories {
+        Some(n) => format!("; it tells {} of parts apart", count(n, "kind")),
+        None => String::new(),
+    };
+    Some(format!(
+        "The gauge is {} by {} ({movement}): {} of all variation is its own{classes}.",
+        called(share),
+        best.property,
+        in_percent(share)
+    ))
+}
+
 fn print(gauged: &Gauged, out: &mut impl Write) -> anyhow::Result<()> {
+    let all = gauged.movements.iter().flat_map(|at| {
+        let properties = at.properties.iter();
+        properties.map(|gauge| (at.movement, gauge))
+    });
+    let mut rows: Vec<(Movement, &Gauge)> = all.collect();
+    rows.sort_by(|(_, a), (_, b)| a.study.gauge_share.total_cmp(&b.study.gauge_share));
+    if let Some(verdict) = verdict(&rows) {
+        writeln!(out, "{verdict}")?;
+    }
     let by = match gauged.operators.len() {
         0 => "nobody named as operator".to_owned(),
         n => count(n as u64, "operator"),
     };
     writeln!(
         out,
-        "{}, {by}, {}",
+        "{}, {by}, {}; standard deviations, the best first:\n\n{:<34} {:>13} {:>10} {:>10} {:>10} {:>8} {:>8}",
         count(gauged.parts as u64, "part"),
-        count(gauged.slides as u64, "slide")
+        count(gauged.slides as u64, "slide"),
+        "property",
+        "repeatability",
+        "operators",
+        "by part",
+        "parts",
+        "gauge",
+        "classes"
     )?;
-    for movement in &gauged.movements {
+    for (movement, gauge) in rows.iter().take(ROWS) {
+        let sd = &gauge.study.sd;
+        let dash = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.4}"));
+        let classes = gauge.study.distinct_categories;
         writeln!(
             out,
-            "\n{}; standard deviations\n{:<14} {:>13} {:>10} {:>13} {:>10} {:>10} {:>9}",
-            movement.movement,
-            "property",
-            "repeatability",
-            "operators",
-            "by part",
-            "parts",
-            "gauge",
-            "classes"
+            "{:<34} {:>13.4} {:>10} {:>10} {:>10.4} {:>8} {:>8}",
+            format!("{} ({}), {movement}", gauge.property, gauge.unit),
+            sd.repeatability,
+            dash(sd.operator),
+            dash(sd.operator_by_part),
+            sd.part,
+            in_percent(gauge.study.gauge_share),
+            classes.map_or("-".to_owned(), |n| n.to_string())
         )?;
-        for gauge in &movement.properties {
-            let sd = &gauge.study.sd;
-            let dash = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.4}"));
-            let classes = gauge.study.distinct_categories;
-            writeln!(
-                out,
-                "{:<14} {:>13.4} {:>10} {:>13} {:>10.4} {:>10} {:>9}",
-                format!("{} ({})", gauge.property, gauge.unit),
-                sd.repeatability,
-                dash(sd.operator),
-                dash(sd.operator_by_part),
-                sd.part,
-                percent((gauge.study.gauge_share * 1000.0).round() / 1000.0),
-                classes.map_or("-".to_owned(), |n| n.to_string())
-            )?;
-        }
-        for gauge in &movement.properties {
-            for slide in &gauge.outside_slides {
-                writeln!(
-                    out,
-                    "outside the control limits of {}: {slide}",
-                    gauge.property
-                )?;
-            }
-        }
+    }
+    if let Some(more) = rows.len().checked_sub(ROWS + 1) {
+        writeln!(out, "and {more} more that separate less, in --format json")?;
+    }
+    let outside: Vec<String> = rows
+        .iter()
+        .flat_map(|(_, gauge)| {
+            let slides = gauge.outside_slides.iter();
+            slides.map(|slide| format!("{slide} ({})", gauge.property))
+        })
+        .collect();
+    if !outside.is_empty() {
+        let more = match outside.len().saturating_sub(OUTSIDE) {
+            0 => String::new(),
+            more => format!(", and {more} more: --plot draws them"),
+        };
+        let first = outside[..outside.len().min(OUTSIDE)].join("; ");
+        writeln!(out, "\nOutside the control limits: {first}{more}")?;
     }
     Ok(())
 }
