@@ -40,13 +40,7 @@ fn drawn(
     });
     let (says, slides): (Vec<String>, Vec<(f64, f64)>) = slides.unzip();
     let many = names.len() > NAMED;
-    let nearest = distances.iter().enumerate().map(|(n, row)| {
-        let others = row.iter().enumerate().filter(|&(other, _)| other != n);
-        others.min_by(|a, b| a.1.total_cmp(b.1))
-    });
-    let nearest: Vec<Option<(usize, f64)>> = nearest
-        .map(|found| found.map(|(other, d)| (other, *d)))
-        .collect();
+    let nearest = nearest(&distances);
     let mut textures = Series::points(0, MARKS[0], "", places.clone());
     let mut series = Vec::new();
     for (n, name) in names.iter().enumerate() {
@@ -111,6 +105,19 @@ fn drawn(
         ..Chart::new(title, axis, axis, x_range, series)
     }
     .figure("map")
+}
+
+/// The nearest other texture of each, and its distance.
+fn nearest(distances: &[Vec<f64>]) -> Vec<Option<(usize, f64)>> {
+    let nearest = distances.iter().enumerate().map(|(n, row)| {
+        let others = row
+            .iter()
+            .copied()
+            .enumerate()
+            .filter(|&(other, _)| other != n);
+        others.min_by(|a, b| a.1.total_cmp(&b.1))
+    });
+    nearest.collect()
 }
 
 /// Width of the area between the axes, and its least and greatest height, px.

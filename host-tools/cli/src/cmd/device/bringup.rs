@@ -126,8 +126,13 @@ pub(crate) fn run(how: &Args, out: &mut impl Write) -> anyhow::Result<()> {
     say(format_args!(
         "The report is in {folder}: report.txt and report.json."
     ));
-    match done.map_err(BenchError::BringUp)? {
-        Ended::Passed if how.bare => {
+    next(product, done.map_err(BenchError::BringUp)?)
+}
+
+/// Says what comes next; an error where a step has not passed.
+fn next(product: Product, ended: Ended) -> anyhow::Result<()> {
+    match ended {
+        Ended::Passed if product == Product::Bare => {
             say("All steps have passed: the board is sound. Please send the report");
         }
         Ended::Passed if product == Product::Printer => say(
