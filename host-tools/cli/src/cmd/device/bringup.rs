@@ -147,7 +147,7 @@ fn next(product: Product, ended: Ended) -> anyhow::Result<()> {
         }
         Ended::Flash(_) if product == Product::Printer => say(
             "The self-test has done its part. Next: flash tactus-arm (cargo xtask size names its file, then tactus \
-             device flash FILE), tactus device printer setup --printer PORT, and the same command again: it slides once",
+             device flash FILE), tactus device printer setup --printer PORT, and this command again: it slides once",
         ),
         Ended::Flash(_) => say(
             "The self-test has done its part. Next: cargo xtask flash, then the same command: the rig's firmware does \
