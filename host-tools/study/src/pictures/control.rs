@@ -6,6 +6,9 @@ use tactus_lab::eval::gauge::{Reading, Study, distinct};
 /// Height of the chart without its words, px.
 const TALL: u32 = 320;
 
+/// Runs of slides of one part whose names have room, most.
+const RUNS: usize = 16;
+
 /// The chart of one property, with the `study` of its `readings`; `unit` follows the name of the axis.
 pub fn figure(
     id: &str,
@@ -27,6 +30,28 @@ pub fn figure(
             ..level("", 0.0)
         },
     ];
+    // each part has its name at the top, and a line before it; not where parts take turns
+    let mut tops = Series::points(0, Mark::None, "", Vec::new());
+    let most = study
+        .away
+        .iter()
+        .fold(limit, |most, away| most.max(away.abs()));
+    let runs: Vec<&[Reading]> = readings.chunk_by(|a, b| a.part == b.part).collect();
+    let mut first = 1.0;
+    for run in runs.iter().take_while(|_| runs.len() <= RUNS) {
+        let before = first - 0.5;
+        first += run.len() as f64;
+        series.push(Series {
+            width: 1,
+            ..Series::dashed("", vec![(before, -most), (before, 1.7 * most)])
+        });
+        tops.points
+            .push((f64::midpoint(before, first - 0.5), 1.65 * most));
+        tops.labels.push(run[0].part.clone());
+    }
+    if !tops.points.is_empty() {
+        series.push(tops);
+    }
     for (n, operator) in operators.iter().enumerate() {
         let of = readings.iter().zip(places());
         let of: Vec<_> = of.filter(|(r, _)| r.operator == *operator).collect();
@@ -62,7 +87,7 @@ pub fn figure(
             ..Series::points(1, Mark::Cross, "outside the limits", outside.collect())
         });
     }
-    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed: three standard \
+    let below = "Each slide, as far as it is from the mean of its part and operator. Dashed across: three standard \
          deviations, by the mean moving range. A slide outside is worth a look at the sample, the finger and the rig.";
     let y = format!("away from the mean{unit}");
     Chart {
