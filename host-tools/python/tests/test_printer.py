@@ -8,7 +8,7 @@ import time
 import types
 
 import pytest
-from conftest import received
+from conftest import received, sent
 from test_arm import MOVEMENT, Probe
 
 import tactus
@@ -64,7 +64,7 @@ class Served:
             said = self.printer.readline()
             if said:
                 self.said.append(said.decode().strip())
-                line.sendall(said.strip() + b"\n")
+                sent(line, said.strip() + b"\n")
 
     def force_mn(self):
         depth = SAMPLE_Z - (self.printer._lastZ or 0.0)
