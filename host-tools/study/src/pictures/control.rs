@@ -30,28 +30,11 @@ pub fn figure(
             ..level("", 0.0)
         },
     ];
-    // each part has its name at the top, and a line before it; not where parts take turns
-    let mut tops = Series::points(0, Mark::None, "", Vec::new());
     let most = study
         .away
         .iter()
         .fold(limit, |most, away| most.max(away.abs()));
-    let runs: Vec<&[Reading]> = readings.chunk_by(|a, b| a.part == b.part).collect();
-    let mut first = 1.0;
-    for run in runs.iter().take_while(|_| runs.len() <= RUNS) {
-        let before = first - 0.5;
-        first += run.len() as f64;
-        series.push(Series {
-            width: 1,
-            ..Series::dashed("", vec![(before, -most), (before, 1.7 * most)])
-        });
-        tops.points
-            .push((f64::midpoint(before, first - 0.5), 1.65 * most));
-        tops.labels.push(run[0].part.clone());
-    }
-    if !tops.points.is_empty() {
-        series.push(tops);
-    }
+    series.extend(parts(readings, most));
     for (n, operator) in operators.iter().enumerate() {
         let of = readings.iter().zip(places());
         let of: Vec<_> = of.filter(|(r, _)| r.operator == *operator).collect();
@@ -96,4 +79,28 @@ pub fn figure(
         ..Chart::new(title, "slide, in the order of time", &y, (0.0, end), series)
     }
     .figure(id)
+}
+
+/// The name of each run of a part at the top, and a line before it; nothing where parts take turns. `most` is the
+/// largest distance that is shown.
+fn parts(readings: &[Reading], most: f64) -> Vec<Series> {
+    let runs: Vec<&[Reading]> = readings.chunk_by(|a, b| a.part == b.part).collect();
+    if runs.len() > RUNS {
+        return Vec::new();
+    }
+    let mut tops = Series::points(0, Mark::None, "", Vec::new());
+    let mut series = Vec::new();
+    let mut first = 0.5;
+    for run in runs {
+        series.push(Series {
+            width: 1,
+            ..Series::dashed("", vec![(first, -most), (first, 1.7 * most)])
+        });
+        let next = first + run.len() as f64;
+        tops.points.push((f64::midpoint(first, next), 1.65 * most));
+        tops.labels.push(run[0].part.clone());
+        first = next;
+    }
+    series.push(tops);
+    series
 }
