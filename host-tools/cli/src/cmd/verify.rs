@@ -232,7 +232,11 @@ fn hold(
     verified.left_out = left_out;
     let mut observed = Vec::new();
     for slide in slides.take(args.stop.max_slides.into()) {
-        let slide = slide?;
+        let told = verified.answer != name(Answer::Unsure);
+        let slide = match slide {
+            Err(_) if told => break,
+            slide => slide?,
+        };
         let Some(movement) = index_of(table, slide.movement) else {
             continue;
         };
@@ -241,7 +245,7 @@ fn hold(
             property: None,
         };
         observed.push((movement, slide.number, slide.observation.clone()));
-        if verified.answer != name(Answer::Unsure) {
+        if told {
             // the picture shows the others, too
             continue;
         }
