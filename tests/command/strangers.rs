@@ -250,6 +250,7 @@ fn what_cannot_be_read_says_what_to_do() {
             &[
                 "no channel or column of numbers \"cloth\"",
                 "columns of words are none",
+                "put them into a folder of it",
             ],
         ),
         ("--speed 300", &["300000 um/s", "leave it out"]),

@@ -273,7 +273,7 @@ fn labels<'s>(signals: &'s Signals, settings: &Settings) -> Result<[Runs<'s>; 2]
                 words.join(", ")
             };
             Err(format!(
-                "{}; the columns of words are {words}",
+                "{}; the columns of words are {words}. To give all files this name, put them into a folder of it",
                 no_channel(signals, column)
             ))
         })
