@@ -1,13 +1,11 @@
 //! `tactus device printer` and `--printer`: a person sets up a printer and has it move the finger, over two ports.
 
-use std::cell::RefCell;
+use std::fs::File;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::process::Stdio;
-use std::rc::Rc;
 use std::sync::mpsc;
 use std::thread;
-use std::time::Instant;
 
 use tactus_core::explorer::Method;
 use tactus_core::features::FeatureSet;
@@ -85,8 +83,8 @@ impl Mover for PrinterLine {
     fn permit(&mut self, _world: &mut World, _permitted: bool) {}
 }
 
-/// Serves a probe whose finger hangs on a printer: its port, and the printer's.
-fn served() -> (String, String) {
+/// Serves a probe whose finger hangs on a printer: its port, and the printer's. The rig's time goes into `clock`.
+fn served(clock: File) -> (String, String) {
     let (probe, port) = listen();
     let (printer, printer_port) = listen();
     printer.set_nonblocking(true).unwrap();
@@ -97,10 +95,7 @@ fn served() -> (String, String) {
         let table = world()
             .learn_at(&Collection::MOVEMENTS, bands, &[], calibration, || ())
             .unwrap();
-        let to = ToArm {
-            said: Rc::new(RefCell::new((Vec::new(), Vec::new()))),
-            began: Instant::now(),
-        };
+        let to = ToArm::new(clock);
         let line = PrinterLine {
             to: to.clone(),
             listener: printer,
@@ -124,8 +119,10 @@ fn served() -> (String, String) {
 
 #[test]
 fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
-    let (port, printer) = served();
-    let at = Scratch::new().with("PORT", &port).with("PRINTER", &printer);
+    let at = Scratch::new();
+    let clock = at.path("clock");
+    let (port, printer) = served(File::create(&clock).unwrap());
+    let at = at.with("PORT", &port).with("PRINTER", &printer);
     let refused = at.error(
         "device identify --port PORT --printer PRINTER --printer-setup mine.json",
         1,
@@ -140,6 +137,7 @@ fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
     let answered = |line: &str, answers: &str| {
         let mut command = at.command(line);
         let mut running = command
+            .env("TACTUS_CLOCK", &clock)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -199,17 +197,12 @@ fn a_person_sets_a_printer_up_and_it_moves_the_finger() {
     assert!((of("acceleration_mm_s2") - 500.0).abs() < 60.0, "{json}");
     assert!((0.3..3.0).contains(&of("stiffness_n_mm")), "{json}");
     assert!(of("backlash_mm") < 0.2, "{json}");
-    let ran = at.run(
-        "device identify --format json --seed 1 --port PORT --printer --printer-setup mine.json",
-    );
+    let line =
+        "device identify --format json --seed 1 --port PORT --printer --printer-setup mine.json";
+    let (code, said) = answered(line, "");
     // a table of another machine knows nothing of this one
-    assert!(
-        matches!(ran.code, Some(0 | 3 | 4)),
-        "{} {}",
-        ran.out,
-        ran.said
-    );
-    let verdict: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert!(matches!(code, Some(0 | 3 | 4)), "{said}");
+    let verdict: serde_json::Value = serde_json::from_str(&said).unwrap();
     assert!(
         verdict["verdict"]["slides"].as_u64() >= Some(1),
         "{verdict}"

@@ -1,8 +1,9 @@
 //! A probe in software: the simulated rig under the core's own probe behind the frames of the link.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
-use std::io::{ErrorKind, Read, Write};
+use std::fs::File;
+use std::io::{ErrorKind, Read, Seek as _, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::rc::Rc;
@@ -131,11 +132,35 @@ pub(super) struct Wire {
     pub(super) arm: Option<ToArm>,
 }
 
-/// Orders to an arm, and its reports; time goes as it does for the arm's own clock since then.
+/// Orders to an arm, and its reports; the rig's time, which goes no faster than a clock, and where it is told: the
+/// command goes by it, so that a busy PC makes nothing late.
 #[derive(Clone)]
 pub(super) struct ToArm {
     pub(super) said: Rc<RefCell<(Vec<ArmOrder>, Vec<ArmReport>)>>,
-    pub(super) began: Instant,
+    began: Rc<Cell<Instant>>,
+    clock: Rc<File>,
+}
+
+impl ToArm {
+    pub(super) fn new(clock: File) -> Self {
+        Self {
+            said: Rc::default(),
+            began: Rc::new(Cell::new(Instant::now())),
+            clock: Rc::new(clock),
+        }
+    }
+
+    fn pace(&self, now: Duration) {
+        let ns = now.as_nanos() as u64;
+        (&*self.clock).rewind().unwrap();
+        (&*self.clock).write_all(&ns.to_le_bytes()).unwrap();
+        let elapsed = self.began.get().elapsed();
+        match now.checked_sub(elapsed) {
+            Some(ahead) => thread::sleep(ahead),
+            // what is lost is not caught up
+            None => self.began.set(self.began.get() + (elapsed - now)),
+        }
+    }
 }
 
 impl Wire {
@@ -238,9 +263,7 @@ impl Host for Wire {
                 Panel::tell(self, Event::Arm(order));
             }
             self.look();
-            let behind = now.saturating_sub(arm.began.elapsed());
-            thread::sleep(behind);
-            return;
+            return arm.pace(now);
         }
         if self.at_ms.is_multiple_of(self.hurry) {
             self.look();

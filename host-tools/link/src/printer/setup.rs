@@ -29,7 +29,6 @@ const FIRST_UM_S: u32 = 500;
 const APPROACH_UM_S: u32 = 1000;
 /// Speeds of the slides in the air by which acceleration and delay are measured, mm/s.
 const AIR_MM_S: [f64; 2] = [10.0, 50.0];
-const AIR_TRIES: u32 = 5;
 /// The delay of a slide's begin varies by as much beside what was measured, s.
 const START_OFF_S: f64 = 0.02;
 /// Constant speed before the window begins and behind its report, s.
@@ -451,20 +450,6 @@ impl Printer {
         }
     }
 
-    /// A slide in the air, and its time, s; made again where the PC was too busy to send it in time.
-    async fn slide_in_air(&self, ends: [f64; 2], z: f64, speed: f64) -> Result<f64, PrinterError> {
-        let mut tries = AIR_TRIES;
-        loop {
-            match self.glide([ends[1], z], speed, None).await {
-                Err(PrinterError::Slow { .. }) if tries > 1 => {
-                    tries -= 1;
-                    self.go(ends[0], z, 50.0).await?;
-                }
-                done => return done,
-            }
-        }
-    }
-
     /// Slides to and fro in the air at two speeds.
     pub(super) async fn measure_motion(&self) -> Result<Motion, PrinterError> {
         let [begin, end] = self.set_up()?.sample_mm;
@@ -475,9 +460,9 @@ impl Printer {
         for (speed, over) in AIR_MM_S.into_iter().zip(&mut over) {
             let way = (end - begin).signum() * length.min(2.0 * speed);
             for (n, over) in over.iter_mut().enumerate() {
-                let ends = [begin, begin + way];
-                let [from, to] = [ends[n % 2], ends[1 - n % 2]];
-                *over = self.slide_in_air([from, to], z, speed).await? - way.abs() / speed;
+                let to = if n % 2 == 0 { begin + way } else { begin };
+                let took = self.glide([to, z], speed, None).await?;
+                *over = took - way.abs() / speed;
             }
         }
         let mean = |over: &[f64; 4]| over.iter().sum::<f64>() / 4.0;
