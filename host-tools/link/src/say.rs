@@ -26,6 +26,11 @@ pub fn percent(share: f64) -> String {
     format!("{} %", percent.trim_end_matches('0').trim_end_matches('.'))
 }
 
+/// The same to a tenth of a per cent, for what is estimated.
+pub fn about_percent(share: f64) -> String {
+    percent((share * 1000.0).round() / 1000.0)
+}
+
 /// A day as messages, tables and recordings have it, in words; nothing for 0.
 pub fn day(date: u32) -> Option<String> {
     let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);

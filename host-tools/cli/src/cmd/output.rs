@@ -5,7 +5,7 @@ use std::io::Write;
 use clap::ValueEnum;
 use serde::Serialize;
 use tactus_lab::data::json;
-pub(crate) use tactus_lab::eval::show::percent;
+pub(crate) use tactus_lab::eval::show::{about_percent, percent};
 use tactus_lab::eval::verdicts::Verdicts;
 
 /// The end of a command that did its work.

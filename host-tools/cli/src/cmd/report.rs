@@ -18,7 +18,7 @@ use tactus_study::page::render;
 use tactus_study::pictures::map;
 
 use super::args::{Only, Recordings};
-use super::output::{Format, UsageError, percent, print_json, verdict_rows};
+use super::output::{Format, UsageError, about_percent, print_json, verdict_rows};
 use super::plot::Plot;
 use super::progress::{notice, progress};
 use super::table_file::{Force, read_table, spare_input, write_file};
@@ -125,7 +125,7 @@ fn of_table(file: &Path, args: &Args, out: &mut impl Write) -> anyhow::Result<()
             command: command(file, args),
             report: &report,
             figures: report.table.open_set.as_ref().map(open_set::in_words),
-            map: map::figure(table)?.svg,
+            map: map::figure(table, None)?.svg,
         };
         let page = render(include_str!("report/page.html"), &page)?;
         write_file(path, page.as_bytes(), args.force)?;
@@ -180,7 +180,7 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
         let (nearest, taken, slides) = match &texture.nearest {
             Some(near) => (
                 near.texture.as_str(),
-                percent((1000.0 * near.taken_for).round() / 1000.0),
+                about_percent(near.taken_for),
                 near.slides.map_or("over ten".to_owned(), |n| n.to_string()),
             ),
             None => ("-", "-".to_owned(), "-".to_owned()),
@@ -219,7 +219,7 @@ fn print(report: &Report, samples: &str, out: &mut impl Write) -> anyhow::Result
         ];
         for (kind, verdicts) in of.into_iter().filter_map(|(k, v)| Some((k, v?))) {
             let told = verdict_rows(verdicts).into_iter().map(|(name, share)| {
-                let share = percent((1000.0 * share).round() / 1000.0);
+                let share = about_percent(share);
                 format!("{} {share}", name.trim())
             });
             let told: Vec<String> = told.collect();

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Args, out: &mut impl Write) -> anyhow::Result<()> {
         Format::Json => print_json(&TableSummary::new(table), out)?,
     }
     if let Some(canvas) = canvas {
-        canvas.write(&[map::figure(table)?], out)?;
+        canvas.write(&[map::figure(table, None)?], out)?;
     }
     Ok(())
 }

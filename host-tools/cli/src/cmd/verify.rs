@@ -20,7 +20,7 @@ use tactus_lab::eval::verified::{Slide, Verified, name, print_score, print_slide
 use tactus_lab::eval::verify::{false_accept, put};
 use tactus_lab::sim::collection::{Collection, calibrated, texture_name};
 use tactus_lab::sim::rig::{SimError, SimRig};
-use tactus_study::pictures::map;
+use tactus_study::pictures::map::{self, Sample};
 
 use super::args::{Only, Stop};
 use super::names::find;
@@ -230,7 +230,8 @@ fn hold(
     let mut explorer = explorer(bytes, measures, config, Some(&[texture]))?;
     verified.sample = Some(sample);
     verified.left_out = left_out;
-    let mut observed = Vec::new();
+    // a map is of one movement
+    let mut shown: Option<Sample> = None;
     for slide in slides.take(args.stop.max_slides.into()) {
         let told = verified.answer != name(Answer::Unsure);
         let slide = match slide {
@@ -244,7 +245,14 @@ fn hold(
             movement,
             property: None,
         };
-        observed.push((movement, slide.number, slide.observation.clone()));
+        let shown = shown.get_or_insert_with(|| Sample {
+            name: verified.sample.clone().unwrap_or_default(),
+            movement,
+            slides: Vec::new(),
+        });
+        if shown.movement == movement {
+            shown.slides.push((slide.number, slide.observation.clone()));
+        }
         if told {
             // the picture shows the others, too
             continue;
@@ -277,15 +285,7 @@ fn hold(
         Format::Text => print(&verified, out)?,
     }
     if let Some(canvas) = canvas {
-        // a map is of one movement
-        let first = observed.first().map_or(0, |(movement, ..)| *movement);
-        observed.retain(|(movement, ..)| *movement == first);
-        let slides = observed
-            .into_iter()
-            .map(|(_, number, slide)| (number, slide));
-        let sample = verified.sample.as_deref().unwrap_or("the sample");
-        let slides: Vec<_> = slides.collect();
-        canvas.write(&[map::with_slides(table, first, sample, &slides)?], out)?;
+        canvas.write(&[map::figure(table, shown.as_ref())?], out)?;
     }
     Ok(Done::of(verified.answer))
 }

@@ -15,7 +15,7 @@ use crate::eval::experiment::Experiment;
 use crate::eval::learn::TableError;
 use crate::eval::learned::LeftOut;
 use crate::eval::samples;
-use crate::eval::show::{count, percent};
+use crate::eval::show::{about_percent, count};
 use crate::eval::table_summary::TableSummary;
 use crate::eval::verdicts::Verdicts;
 
@@ -162,9 +162,8 @@ impl Report {
                 "Ten slides do not tell {same} of {all} from the nearest one; the others take {most} at most"
             ),
         };
-        let share = |share: f64| percent((1000.0 * share).round() / 1000.0);
         let told = self.recorded.as_ref().map(|recorded| {
-            let (right, wrong) = (share(recorded.known.right), share(recorded.known.wrong));
+            let [right, wrong] = [recorded.known.right, recorded.known.wrong].map(about_percent);
             format!("; recorded slides get the right name in {right}, a wrong one in {wrong}")
         });
         format!("{apart}{}.", told.unwrap_or_default())

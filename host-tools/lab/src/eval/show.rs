@@ -10,7 +10,7 @@ use tactus_core::wire::{Event, Prompt};
 use crate::eval::open_set;
 use crate::eval::samples;
 use crate::eval::table_summary::TableSummary;
-pub use tactus_link::say::{count, day, percent};
+pub use tactus_link::say::{about_percent, count, day, percent};
 
 const BAR: usize = 24;
 /// Most candidates listed after a slide.

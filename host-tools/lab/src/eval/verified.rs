@@ -8,7 +8,7 @@ use tactus_core::table::Table;
 use tactus_core::wire::Failure;
 
 use super::learned::LeftOut;
-use super::show::{count, percent};
+use super::show::{about_percent, count, percent};
 
 /// The output of `verify --format json`.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -148,7 +148,7 @@ pub fn print_score(v: &Verified, out: &mut impl Write) -> io::Result<()> {
             false => (&reference[..], "another texture"),
         };
         let accepted = v.false_accept.map_or(String::new(), |share| {
-            let share = percent((share * 1000.0).round() / 1000.0);
+            let share = about_percent(share);
             format!(" ({share} of the table's other textures would be)")
         });
         writeln!(

@@ -9,34 +9,29 @@ use tactus_lab::eval::places::{Plane, distances, off, slide_distances};
 /// More textures than this have numbers in the map and a list of names below it.
 const NAMED: usize = 40;
 
-/// The map of a table's textures.
-pub fn figure(table: Table<'_>) -> anyhow::Result<Figure> {
-    drawn(table, None, "", &[])
+/// Slides of a movement among a table's textures.
+pub struct Sample {
+    /// Its name.
+    pub name: String,
+    /// The table's movement.
+    pub movement: u8,
+    /// Number and features of each slide.
+    pub slides: Vec<(u32, Observation)>,
 }
 
-/// The map at a movement, and numbered slides of that movement in it.
-pub fn with_slides(
-    table: Table<'_>,
-    movement: u8,
-    sample: &str,
-    slides: &[(u32, Observation)],
-) -> anyhow::Result<Figure> {
-    drawn(table, Some(movement), sample, slides)
-}
-
-fn drawn(
-    table: Table<'_>,
-    movement: Option<u8>,
-    sample: &str,
-    slides: &[(u32, Observation)],
-) -> anyhow::Result<Figure> {
+/// The map of a table's textures, and that of a movement with the slides of a sample.
+pub fn figure(table: Table<'_>, sample: Option<&Sample>) -> anyhow::Result<Figure> {
+    let movement = sample.map(|sample| sample.movement);
     let distances = distances(table, movement);
     let names: Vec<&str> = table.names().collect();
     let plane = Plane::of(&distances);
     let places = plane.places.clone();
-    let slides = slides.iter().filter_map(|(number, slide)| {
-        let from_all = slide_distances(table, movement?, slide)?;
-        Some((format!("{sample}, slide {number}"), plane.place(&from_all)))
+    let slides = sample.into_iter().flat_map(|sample| {
+        sample.slides.iter().filter_map(|(number, slide)| {
+            let from_all = slide_distances(table, sample.movement, slide)?;
+            let says = format!("{}, slide {number}", sample.name);
+            Some((says, plane.place(&from_all)))
+        })
     });
     let (says, slides): (Vec<String>, Vec<(f64, f64)>) = slides.unzip();
     let many = names.len() > NAMED;
@@ -64,15 +59,11 @@ fn drawn(
         }
     }
     series.push(textures);
-    if !slides.is_empty() {
+    if let Some(sample) = sample {
+        let name = format!("{}, each slide", sample.name);
         series.push(Series {
             says,
-            ..Series::points(
-                1,
-                Mark::Cross,
-                format!("{sample}, each slide"),
-                slides.clone(),
-            )
+            ..Series::points(1, Mark::Cross, name, slides.clone())
         });
     }
     let below = format!(

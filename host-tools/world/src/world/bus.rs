@@ -73,7 +73,7 @@ impl World {
             self.miso.pass(self.now_ns, mosi, line, &self.faults);
         }
         let line = sensor.line().get(count).copied();
-        line.unwrap_or(Miso::idle(&self.faults))
+        line.unwrap_or(self.idle_miso())
     }
 
     /// MISO of a part that drives nothing: its pull-up, or the level that it is tied to.

@@ -13,7 +13,7 @@ use tactus_study::chart::Figure;
 use tactus_study::pictures::control;
 
 use crate::cmd::args::Only;
-use crate::cmd::output::{Format, UsageError, percent, print_json};
+use crate::cmd::output::{Format, UsageError, about_percent, print_json};
 use crate::cmd::plot::Plot;
 use crate::cmd::textures::measure_folder;
 
@@ -194,10 +194,6 @@ fn called(share: f64) -> &'static str {
     }
 }
 
-fn in_percent(share: f64) -> String {
-    percent((share * 1000.0).round() / 1000.0)
-}
-
 /// The answer in a sentence: the reading that separates parts best.
 fn verdict(rows: &[(Movement, &Gauge)]) -> Option<String> {
     let (movement, best) = rows.first()?;
@@ -210,7 +206,7 @@ fn verdict(rows: &[(Movement, &Gauge)]) -> Option<String> {
         "The gauge is {} by {} ({movement}): {} of all variation is its own{classes}.",
         called(share),
         best.property,
-        in_percent(share)
+        about_percent(share)
     ))
 }
 
@@ -253,7 +249,7 @@ fn print(gauged: &Gauged, out: &mut impl Write) -> anyhow::Result<()> {
             dash(sd.operator),
             dash(sd.operator_by_part),
             sd.part,
-            in_percent(gauge.study.gauge_share),
+            about_percent(gauge.study.gauge_share),
             classes.map_or("-".to_owned(), |n| n.to_string())
         )?;
     }
