@@ -34,20 +34,14 @@ pub(super) fn play(cases: impl IntoIterator<Item = Case>) {
 }
 
 fn miswired(step: &'static str, mistake: &'static str, miswired: Miswired) -> Case {
-    let mistakes = vec![miswired];
-    let built = Built {
-        mistakes,
-        ..Built::default()
-    };
+    let mut built = Built::default();
+    built.mistakes.push(miswired);
     Case(step, mistake, built)
 }
 
 fn broken(step: &'static str, mistake: &'static str, fault: Fault) -> Case {
-    let faults = vec![fault];
-    let built = Built {
-        faults,
-        ..Built::default()
-    };
+    let mut built = Built::default();
+    built.faults.push(fault);
     Case(step, mistake, built)
 }
 
