@@ -11,6 +11,8 @@ mod moves;
 mod port;
 mod press;
 mod setup;
+#[cfg(test)]
+mod tests;
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
